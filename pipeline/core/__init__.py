@@ -1,0 +1,1 @@
+"""The ground floor: what a specimen, a problem and a solution are. NumPy only."""

@@ -1,0 +1,18 @@
+"""Fixtures for every room."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of measured and challenge data; set COHESIVE_BPM_DATA where it lies elsewhere."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("COHESIVE_BPM_DATA", default))
+    if not folder.is_dir():
+        pytest.skip(f"no measured data at {folder}: set COHESIVE_BPM_DATA to their folder")
+    return folder
