@@ -131,9 +131,10 @@ def test_translating_everything_translates_the_answer(lattice):
     rng = np.random.default_rng(0)
     field = 1e-6 * rng.standard_normal((1, particles.count, 2))
     limit = np.full(bonds.count, 1e-3)
+    shift = np.array([0.013, -0.7])
     here, _ = observe(particles, bonds, field, POINTS, limit)
-    there = Particles(particles.position + [0.013, -0.7], R, particles.phase, particles.stone)
-    moved, _ = observe(there, bonds, field, POINTS + [0.013, -0.7], limit)
+    there = Particles(particles.position + shift, R, particles.phase, particles.stone)
+    moved, _ = observe(there, bonds, field, POINTS + shift, limit)
     np.testing.assert_allclose(
         moved, here, rtol=0, atol=1e-6 * 1e-10
     )  # positions of 0.7 m carry 1e-16 / 1e-3 of the reach
