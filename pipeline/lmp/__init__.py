@@ -1,0 +1,1 @@
+"""The production engine: LAMMPS with a softening bond of our own."""

@@ -1,0 +1,502 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+
+#include "fix_cohesive_drive.h"
+
+#include "bond_cohesive.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "memory.h"
+#include "neighbor.h"
+#include "update.h"
+#include "utils.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+
+// share of the largest stable step at which the masses are set; the rest covers finite kinematics
+static constexpr double SAFETY = 0.9;
+static constexpr int NVECTOR = 16;
+
+FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
+    Fix(lmp, narg, arg), state{}, window{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr)
+{
+  nevery = 20;
+  accuracy = 0.01;
+  omega = cmod_max = first_rate = highest_rate = lowest_rate = 0.0;
+  patience = 1.0;
+  work_step_damping = 0.0;
+  parse(narg, arg);
+  vector_flag = 1;
+  size_vector = NVECTOR;
+  global_freq = 1;
+  extvector = 0;
+  time_integrate = 1;
+  restart_global = 1;
+  restart_peratom = 1;
+  comm_reverse = 3;
+  state.rate = first_rate;
+  state.frame_due = 1.0;
+  state.next_frame = stations.empty() ? INFINITY : stations.front();
+  built_calls = built_step = -1;
+  FixCohesiveDrive::grow_arrays(atom->nmax);
+  atom->add_callback(Atom::GROW);
+  atom->add_callback(Atom::RESTART);
+  for (int i = 0; i < atom->nlocal; i++)
+    for (int k = 0; k < 2; k++) mean_v[i][k] = atom->v[i][k];
+}
+
+FixCohesiveDrive::~FixCohesiveDrive()
+{
+  atom->delete_callback(id, Atom::GROW);
+  atom->delete_callback(id, Atom::RESTART);
+  memory->destroy(mean_v);
+  memory->destroy(stiffness);
+}
+
+// grip WEIGHTS DX DY DRIVE drive|react|guide
+void FixCohesiveDrive::parse_grip(char **arg)
+{
+  Grip grip;
+  grip.weights = arg[0];
+  grip.dx = utils::numeric(FLERR, arg[1], false, lmp);
+  grip.dy = utils::numeric(FLERR, arg[2], false, lmp);
+  grip.drive = utils::numeric(FLERR, arg[3], false, lmp);
+  grip.reaction = grip.mobility = 0.0;
+  if (strcmp(arg[4], "drive") == 0)
+    grip.role = DRIVE;
+  else if (strcmp(arg[4], "react") == 0)
+    grip.role = REACT;
+  else if (strcmp(arg[4], "guide") == 0)
+    grip.role = GUIDE;
+  else
+    error->all(FLERR, "role = {} of a grip must be drive, react or guide", arg[4]);
+  if (std::fabs(std::hypot(grip.dx, grip.dy) - 1.0) > 1e-9)
+    error->all(FLERR, "direction = ({}, {}) of a grip must be a unit vector", arg[1], arg[2]);
+  grips.push_back(grip);
+}
+
+void FixCohesiveDrive::parse(int narg, char **arg)
+{
+  int k = 3;
+  const auto need = [&](int n) {
+    if (k + n >= narg) error->all(FLERR, "fix cohesive/drive: '{}' needs {} more value(s)", arg[k], n);
+  };
+  const auto number = [&](double &value) {
+    need(1);
+    value = utils::numeric(FLERR, arg[k + 1], false, lmp);
+    k += 2;
+  };
+  while (k < narg) {
+    if (strcmp(arg[k], "grip") == 0) {
+      need(5);
+      parse_grip(&arg[k + 1]);
+      k += 6;
+    } else if (strcmp(arg[k], "gauge") == 0) {
+      need(1);
+      gauge = arg[k + 1];
+      k += 2;
+    } else if (strcmp(arg[k], "record") == 0) {
+      need(1);
+      nevery = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+      k += 2;
+    } else if (strcmp(arg[k], "frames") == 0) {
+      need(1);
+      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+      need(n + 1);
+      for (int i = 0; i < n; i++) stations.push_back(utils::numeric(FLERR, arg[k + 2 + i], false, lmp));
+      k += n + 2;
+    } else if (strcmp(arg[k], "accuracy") == 0)
+      number(accuracy);
+    else if (strcmp(arg[k], "omega") == 0)
+      number(omega);
+    else if (strcmp(arg[k], "cmod") == 0)
+      number(cmod_max);
+    else if (strcmp(arg[k], "rate") == 0) {
+      need(3);
+      first_rate = utils::numeric(FLERR, arg[k + 1], false, lmp);
+      lowest_rate = utils::numeric(FLERR, arg[k + 2], false, lmp);
+      highest_rate = utils::numeric(FLERR, arg[k + 3], false, lmp);
+      k += 4;
+    } else if (strcmp(arg[k], "patience") == 0)
+      number(patience);
+    else
+      error->all(FLERR, "fix cohesive/drive does not know '{}'", arg[k]);
+  }
+  if (grips.empty() || gauge.empty()) error->all(FLERR, "fix cohesive/drive needs grips and a gauge");
+  if (!(omega > 0.0)) error->all(FLERR, "omega = {:g} must be positive", omega);
+  if (!(cmod_max > 0.0)) error->all(FLERR, "cmod = {:g} m must be positive", cmod_max);
+  if (!(accuracy > 0.0)) error->all(FLERR, "accuracy = {:g} must be positive", accuracy);
+  if (!(first_rate > 0.0)) error->all(FLERR, "rate = {:g} must be positive", first_rate);
+  if (nevery < 1) error->all(FLERR, "record = {} must be positive", nevery);
+}
+
+int FixCohesiveDrive::setmask()
+{
+  return INITIAL_INTEGRATE | END_OF_STEP;
+}
+
+void FixCohesiveDrive::init()
+{
+  bond = dynamic_cast<BondCohesive *>(force->bond_match("cohesive"));
+  if (!bond) error->all(FLERR, "fix cohesive/drive needs bond_style cohesive");
+  if (!atom->rmass_flag || !atom->rmass)
+    error->all(FLERR, "fix cohesive/drive needs a mass for each particle: use 'fix property/atom rmass'");
+  built_calls = -1;
+}
+
+double *FixCohesiveDrive::weights(const std::string &name) const
+{
+  int is_double, columns;
+  const int index = atom->find_custom(name.c_str(), is_double, columns);
+  if (index < 0 || !is_double || columns != 0)
+    error->all(FLERR, "no per-particle weights d_{}: use 'fix property/atom d_{}'", name, name);
+  return atom->dvector[index];
+}
+
+// fictitious masses: the same highest frequency around every particle, its bound being
+// omega² <= 2 max eigenvalue of (sum of k_n n⊗n) / m
+void FixCohesiveDrive::assign_masses()
+{
+  memory->destroy(stiffness);
+  const int nall = atom->nlocal + atom->nghost;
+  memory->create(stiffness, std::max(nall, 1), 3, "cohesive/drive:stiffness");
+  for (int i = 0; i < nall; i++) stiffness[i][0] = stiffness[i][1] = stiffness[i][2] = 0.0;
+  bond->add_stiffness(stiffness);
+  if (force->newton_bond) comm->reverse_comm(this);
+  const double scale = update->dt * update->dt / (2.0 * SAFETY * SAFETY);
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double half = 0.5 * (stiffness[i][0] + stiffness[i][1]);
+    const double largest = half + std::hypot(0.5 * (stiffness[i][0] - stiffness[i][1]), stiffness[i][2]);
+    if (!(largest > 0.0)) error->one(FLERR, "particle {} has no cohesive bond", atom->tag[i]);
+    atom->rmass[i] = scale * largest;
+  }
+}
+
+int FixCohesiveDrive::pack_reverse_comm(int n, int first, double *buf)
+{
+  int m = 0;
+  for (int i = first; i < first + n; i++)
+    for (int k = 0; k < 3; k++) buf[m++] = stiffness[i][k];
+  return m;
+}
+
+void FixCohesiveDrive::unpack_reverse_comm(int n, int *atoms, double *buf)
+{
+  int m = 0;
+  for (int i = 0; i < n; i++)
+    for (int k = 0; k < 3; k++) stiffness[atoms[i]][k] += buf[m++];
+}
+
+void FixCohesiveDrive::setup(int)
+{
+  assign_masses();
+  build_lists();
+  if (state.gauge_set == 0.0) {
+    double sum = gauge_sum();
+    MPI_Allreduce(&sum, &state.cmod_zero, 1, MPI_DOUBLE, MPI_SUM, world);
+    state.gauge_set = 1.0;
+  }
+  window = {};
+  damping_rate = 2.0 * omega;
+  mean_rate = omega;
+}
+
+bool FixCohesiveDrive::lists_are_old() const
+{
+  return built_calls != neighbor->ncalls || built_step != neighbor->lastcall;
+}
+
+void FixCohesiveDrive::build_lists()
+{
+  for (auto &grip : grips) {
+    const double *weight = weights(grip.weights);
+    grip.atom.clear();
+    grip.weight.clear();
+    double mobility = 0.0;
+    for (int i = 0; i < atom->nlocal; i++) {
+      if (weight[i] == 0.0) continue;
+      grip.atom.push_back(i);
+      grip.weight.push_back(weight[i]);
+      mobility += weight[i] * weight[i] / atom->rmass[i];
+    }
+    MPI_Allreduce(&mobility, &grip.mobility, 1, MPI_DOUBLE, MPI_SUM, world);
+    if (!(grip.mobility > 0.0)) error->all(FLERR, "no particle has a weight in d_{}", grip.weights);
+  }
+  const double *weight = weights(gauge);
+  gauge_atom.clear();
+  gauge_weight.clear();
+  for (int i = 0; i < atom->nlocal; i++) {
+    if (weight[i] == 0.0) continue;
+    gauge_atom.push_back(i);
+    gauge_weight.push_back(weight[i]);
+  }
+  built_calls = neighbor->ncalls;
+  built_step = neighbor->lastcall;
+}
+
+double FixCohesiveDrive::gauge_sum() const
+{
+  double sum = 0.0;
+  for (size_t k = 0; k < gauge_atom.size(); k++) sum += gauge_weight[k] * atom->x[gauge_atom[k]][0];
+  return sum;
+}
+
+// leapfrog with damping towards the running mean of the velocity; returns the energy it took away
+double FixCohesiveDrive::advance(double dt)
+{
+  double **x = atom->x, **v = atom->v, **f = atom->f;
+  const double *mass = atom->rmass;
+  const double c = damping_rate * dt, keep = 1.0 / (1.0 + c), follow = mean_rate * dt;
+  double lost = 0.0;
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double push = dt / mass[i];
+    double loss = 0.0;
+    for (int k = 0; k < 2; k++) {
+      const double before = v[i][k], mean = mean_v[i][k];
+      const double after = keep * (before + push * f[i][k] + c * mean);
+      loss += (after - mean) * (before + after);
+      v[i][k] = after;
+      x[i][k] += dt * after;
+      mean_v[i][k] = mean + follow * (after - mean);
+    }
+    lost += 0.5 * c * mass[i] * loss;
+  }
+  return lost;
+}
+
+void FixCohesiveDrive::initial_integrate(int)
+{
+  if (lists_are_old()) build_lists();
+  const double dt = update->dt;
+  window.steps += 1.0;
+  window.gauge += gauge_sum();
+  window.load_line += state.load_line;
+
+  // what the gripped particles were before the step
+  std::vector<double> before;
+  for (const auto &grip : grips)
+    for (const int i : grip.atom)
+      for (int k = 0; k < 2; k++) {
+        before.push_back(atom->v[i][k]);
+        before.push_back(mean_v[i][k]);
+      }
+  double lost = advance(dt);
+
+  // one reaction a grip, from the mean velocity that is missing
+  std::vector<double> local(grips.size()), missing(grips.size());
+  for (size_t g = 0; g < grips.size(); g++) {
+    const auto &grip = grips[g];
+    for (size_t k = 0; k < grip.atom.size(); k++) {
+      const double *v = atom->v[grip.atom[k]];
+      local[g] += grip.weight[k] * (grip.dx * v[0] + grip.dy * v[1]);
+    }
+  }
+  MPI_Allreduce(local.data(), missing.data(), static_cast<int>(grips.size()), MPI_DOUBLE, MPI_SUM, world);
+
+  const double c = damping_rate * dt, follow = mean_rate * dt;
+  size_t at = 0;
+  double drive = 0.0, react = 0.0;
+  for (size_t g = 0; g < grips.size(); g++) {
+    auto &grip = grips[g];
+    const double impulse = (grip.drive * state.rate - missing[g]) / grip.mobility;
+    grip.reaction = impulse * (1.0 + c) / dt;
+    for (size_t k = 0; k < grip.atom.size(); k++) {
+      const int i = grip.atom[k];
+      const double direction[2] = {grip.dx, grip.dy};
+      for (int d = 0; d < 2; d++) {
+        const double was = before[at++], mean = before[at++], now = atom->v[i][d];
+        const double change = impulse * grip.weight[k] * direction[d] / atom->rmass[i];
+        atom->v[i][d] += change;
+        atom->x[i][d] += dt * change;
+        mean_v[i][d] += follow * change;
+        lost += 0.5 * c * atom->rmass[i] *
+            ((now + change - mean) * (was + now + change) - (now - mean) * (was + now));
+      }
+    }
+    if (grip.role == DRIVE) drive += grip.reaction;
+    if (grip.role == REACT) react += grip.reaction;
+    state.work += grip.reaction * grip.drive * state.rate * dt;
+  }
+  window.drive += drive;
+  window.react += react;
+  state.load_line += state.rate * dt;
+  work_step_damping += lost;
+}
+
+double FixCohesiveDrive::kinetic_energy() const
+{
+  double sum = 0.0;
+  for (int i = 0; i < atom->nlocal; i++)
+    sum += 0.5 * atom->rmass[i] * (atom->v[i][0] * atom->v[i][0] + atom->v[i][1] * atom->v[i][1]);
+  return sum;
+}
+
+void FixCohesiveDrive::end_of_step()
+{
+  record();
+  measure_lag();
+  mark_frames();
+  choose_rate();
+}
+
+// means over the steps since the last record, and the energies now
+void FixCohesiveDrive::record()
+{
+  double stored, dissipated;
+  bond->energies(stored, dissipated);
+  const double local[5] = {window.gauge, kinetic_energy(), work_step_damping, stored, dissipated};
+  double all[5];
+  MPI_Allreduce(local, all, 5, MPI_DOUBLE, MPI_SUM, world);
+  const double n = std::max(window.steps, 1.0);
+  state.cmod = all[0] / n - state.cmod_zero;
+  state.kinetic = all[1];
+  state.damping += all[2];
+  state.stored = all[3];
+  state.dissipated = all[4];
+  state.load_drive = window.drive / n;
+  state.load_react = window.react / n;
+  state.load = 0.5 * (state.load_drive + state.load_react);
+  state.load_line_mean = window.load_line / n;
+  state.peak = std::max(state.peak, state.load);
+  window = {};
+  work_step_damping = 0.0;
+}
+
+// share of the machine's power, at peak load, that goes into motion and drag instead of the specimen
+void FixCohesiveDrive::measure_lag()
+{
+  const double lost = state.kinetic + state.damping;
+  const double power = state.peak * state.rate * nevery * update->dt;
+  const double now = power > 0.0 ? (lost - state.lost_before) / power : 0.0;
+  state.lost_before = lost;
+  const double share = std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
+  state.lag += share * (std::fabs(now) - state.lag);
+  state.error_sum += state.lag * state.lag * (state.cmod - state.last_cmod);
+  state.error_weight += state.cmod - state.last_cmod;
+  state.last_cmod = state.cmod;
+}
+
+void FixCohesiveDrive::mark_frames()
+{
+  state.frame_due = 1.0;
+  if (state.cmod < state.next_frame) return;
+  state.frame_due = 0.0;
+  const auto next = std::upper_bound(stations.begin(), stations.end(), state.cmod);
+  state.next_frame = next == stations.end() ? INFINITY : *next;
+}
+
+// faster where the lag is below what was asked for, slower where it is above
+void FixCohesiveDrive::choose_rate()
+{
+  if (highest_rate <= lowest_rate) return;
+  const double target = accuracy;
+  const double period = 2.0 * M_PI / omega;
+  const double wish = std::clamp(std::sqrt(target / std::max(state.lag, 1e-3 * target)), 0.5, 2.0);
+  double factor = std::pow(wish, nevery * update->dt / (patience * period));
+  factor = std::clamp(factor, lowest_rate / state.rate, highest_rate / state.rate);
+  if (factor == 1.0) return;
+  for (int i = 0; i < atom->nlocal; i++)
+    for (int k = 0; k < 2; k++) {
+      atom->v[i][k] *= factor;
+      mean_v[i][k] *= factor;
+    }
+  state.damping += (1.0 - factor * factor) * state.kinetic;
+  state.lost_before += (1.0 - factor * factor) * state.kinetic;
+  state.kinetic *= factor * factor;
+  state.lost_before -= (1.0 - factor * factor) * state.kinetic / (factor * factor);
+  state.rate *= factor;
+}
+
+double FixCohesiveDrive::compute_vector(int k)
+{
+  switch (k) {
+    case 0: return state.cmod;
+    case 1: return state.load;
+    case 2: return state.load_line_mean;
+    case 3: return state.load_drive;
+    case 4: return state.load_react;
+    case 5: return state.work;
+    case 6: return state.stored;
+    case 7: return state.dissipated;
+    case 8: return state.kinetic;
+    case 9: return state.damping;
+    case 10: return state.rate;
+    case 11: return state.error_weight > 0.0 ? std::sqrt(state.error_sum / state.error_weight) : 0.0;
+    case 12: return state.frame_due;
+    case 13: return state.cmod >= cmod_max ? 1.0 : 0.0;
+    case 14: return state.lag;
+    default: return state.load_line;
+  }
+}
+
+double FixCohesiveDrive::memory_usage()
+{
+  return 2.0 * atom->nmax * sizeof(double);
+}
+
+void FixCohesiveDrive::grow_arrays(int nmax)
+{
+  memory->grow(mean_v, nmax, 2, "cohesive/drive:mean_v");
+}
+
+void FixCohesiveDrive::copy_arrays(int i, int j, int)
+{
+  for (int k = 0; k < 2; k++) mean_v[j][k] = mean_v[i][k];
+}
+
+int FixCohesiveDrive::pack_exchange(int i, double *buf)
+{
+  for (int k = 0; k < 2; k++) buf[k] = mean_v[i][k];
+  return 2;
+}
+
+int FixCohesiveDrive::unpack_exchange(int nlocal, double *buf)
+{
+  for (int k = 0; k < 2; k++) mean_v[nlocal][k] = buf[k];
+  return 2;
+}
+
+int FixCohesiveDrive::pack_restart(int i, double *buf)
+{
+  buf[0] = 3;
+  return 1 + pack_exchange(i, buf + 1);
+}
+
+void FixCohesiveDrive::unpack_restart(int nlocal, int nth)
+{
+  double **extra = atom->extra;
+  int m = 0;
+  for (int i = 0; i < nth; i++) m += static_cast<int>(extra[nlocal][m]);
+  for (int k = 0; k < 2; k++) mean_v[nlocal][k] = extra[nlocal][m + 1 + k];
+}
+
+int FixCohesiveDrive::size_restart(int)
+{
+  return 3;
+}
+
+int FixCohesiveDrive::maxsize_restart()
+{
+  return 3;
+}
+
+void FixCohesiveDrive::write_restart(FILE *fp)
+{
+  if (comm->me != 0) return;
+  const int size = sizeof(State);
+  fwrite(&size, sizeof(int), 1, fp);
+  fwrite(&state, sizeof(State), 1, fp);
+}
+
+void FixCohesiveDrive::restart(char *buf)
+{
+  memcpy(&state, buf, sizeof(State));
+}

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later
+   LAMMPS fix `cohesive/drive`: opens a specimen slowly enough to stay near equilibrium. */
+
+#ifdef FIX_CLASS
+// clang-format off
+FixStyle(cohesive/drive,FixCohesiveDrive);
+// clang-format on
+#else
+
+#ifndef LMP_FIX_COHESIVE_DRIVE_H
+#define LMP_FIX_COHESIVE_DRIVE_H
+
+#include "fix.h"
+
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class FixCohesiveDrive : public Fix {
+ public:
+  FixCohesiveDrive(class LAMMPS *, int, char **);
+  ~FixCohesiveDrive() override;
+
+  int setmask() override;
+  void init() override;
+  void setup(int) override;
+  void initial_integrate(int) override;
+  void end_of_step() override;
+  double compute_vector(int) override;
+  double memory_usage() override;
+
+  void grow_arrays(int) override;
+  void copy_arrays(int, int, int) override;
+  int pack_exchange(int, double *) override;
+  int unpack_exchange(int, double *) override;
+  int pack_restart(int, double *) override;
+  void unpack_restart(int, int) override;
+  int size_restart(int) override;
+  int maxsize_restart() override;
+  void write_restart(FILE *) override;
+  void restart(char *) override;
+  int pack_reverse_comm(int, int, double *) override;
+  void unpack_reverse_comm(int, int *, double *) override;
+
+ private:
+  enum Role { DRIVE, REACT, GUIDE };
+
+  // one prescribed mean velocity: sum of weight × direction·v = drive × rate
+  struct Grip {
+    std::string weights;
+    double dx, dy, drive;
+    Role role;
+    std::vector<int> atom;
+    std::vector<double> weight;
+    double mobility;    // sum of weight² / mass, all ranks
+    double reaction;
+  };
+
+  // everything that a restart has to bring back
+  struct State {
+    double load_line, rate, cmod_zero, gauge_set;
+    double work, damping, lost_before;
+    double peak, lag, error_sum, error_weight;
+    double cmod, load, load_line_mean, load_drive, load_react, stored, dissipated, kinetic;
+    double next_frame, frame_due, last_cmod;
+  } state;
+
+  // sums over the steps since the last record
+  struct Window {
+    double steps, drive, react, load_line, gauge;
+  } window;
+
+  void parse(int, char **);
+  void parse_grip(char **);
+  double *weights(const std::string &) const;
+  void assign_masses();
+  void build_lists();
+  bool lists_are_old() const;
+  double gauge_sum() const;
+  double advance(double factor);
+  void grip_velocities();
+  void record();
+  void measure_lag();
+  void choose_rate();
+  void mark_frames();
+  double kinetic_energy() const;
+
+  class BondCohesive *bond;
+  std::vector<Grip> grips;
+  std::string gauge;
+  std::vector<int> gauge_atom;
+  std::vector<double> gauge_weight;
+
+  double accuracy, omega, cmod_max, first_rate, highest_rate, lowest_rate, patience;
+  double damping_rate, mean_rate;
+  std::vector<double> stations;
+  double **mean_v;           // running mean of the velocity, x and y
+  double **stiffness;        // scratch of assign_masses
+  double work_step_damping;
+  bigint built_calls, built_step;
+};
+
+}    // namespace LAMMPS_NS
+
+#endif
+#endif

@@ -1,0 +1,92 @@
+"""The generated files that stand beside a plain deck: values, bond coefficients, grips."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.core.problem import Grip, Problem
+from pipeline.lmp.data_file import write_data_file
+from pipeline.lmp.law_table import LawTable, law_table
+from pipeline.lmp.modes import Modes, lowest_modes
+from pipeline.lmp.loading import Loading, loading_rule
+
+DECK = "fracture.lmp"
+
+
+def write_deck(folder: Path, problem: Problem) -> Loading:
+    """Write a folder in which `lmp -in fracture.lmp` runs the problem; the loading it will use."""
+    table = law_table(problem)
+    modes = lowest_modes(problem)
+    loading = loading_rule(problem, modes)
+    write_data_file(folder / "specimen.data", problem, table, loading.first_rate * modes.response)
+    (folder / "settings.inc").write_text(_settings(problem, loading), encoding="ascii")
+    (folder / "bonds.inc").write_text(_coefficients(table), encoding="ascii")
+    (folder / "attachments.inc").write_text(_attachments(problem), encoding="ascii")
+    (folder / "drive.inc").write_text(_drive(problem, loading, modes), encoding="ascii")
+    with as_file(deck_source() / DECK) as source:
+        shutil.copyfile(source, folder / DECK)
+    return loading
+
+
+def deck_source():
+    """Folder of the plain decks: inside the installed package, or at the top of a checkout."""
+    packed = files("pipeline") / "lammps_inputs"
+    return packed if packed.is_dir() else Path(__file__).resolve().parents[2] / "lammps_inputs"
+
+
+def _settings(problem: Problem, loading: Loading) -> str:
+    radius = problem.particles.radius
+    values = {
+        "kinematics": problem.kinematics.value,
+        "cmod_max": f"{problem.cmod_max:.17g}",
+        # never-deleted bonds stretch by the crack opening: partners must stay within the ghost cutoff
+        "cutoff": f"{6 * radius + 2 * problem.cmod_max:.9g}",
+        "skin": f"{2 * radius:.9g}",
+        "record": str(loading.record),
+        "steps_max": str(loading.steps_max),
+    }
+    return "".join(f"variable {name} index {value}\n" for name, value in values.items())
+
+
+def _coefficients(table: LawTable) -> str:
+    lines = ["# type k_n (N/m) f_max (N) delta_max (m)"]
+    for k, (row, name) in enumerate(zip(table.rows, table.name, strict=True), 1):
+        k_n, f_max, delta_max = row
+        rest = "elastic" if np.isinf(f_max) else f"{f_max:.17g} {delta_max:.17g}"
+        lines.append(f"bond_coeff {k} {k_n:.17g} {rest}  # {name}")
+    return "\n".join(lines) + "\n"
+
+
+def _attachments(problem: Problem) -> str:
+    """Weights of grips and gauge as custom properties of the particles."""
+    weights = {grip.name: (grip.index, grip.weight) for grip in problem.grips}
+    weights["gauge"] = (problem.gauge.index, problem.gauge.weight)
+    lines = ["fix weights all property/atom " + " ".join(f"d_{name}" for name in weights)]
+    for name, (index, weight) in weights.items():
+        lines += [f"set atom {i + 1} d_{name} {w:.17g}" for i, w in zip(index, weight, strict=True) if w != 0]
+    return "\n".join(lines) + "\n"
+
+
+def _drive(problem: Problem, loading: Loading, modes: Modes) -> str:
+    words = [
+        "fix drive all cohesive/drive",
+        "gauge gauge",
+        *(_grip(grip) for grip in problem.grips),
+        f"cmod {problem.cmod_max:.17g}",
+        f"record {loading.record}",
+        f"omega {modes.omega:.17g}",
+        f"accuracy {loading.lag:.17g}",
+        f"rate {loading.first_rate:.17g} {loading.lowest_rate:.17g} {loading.highest_rate:.17g}",
+        f"frames {len(problem.stations)} " + " ".join(f"{s:.17g}" for s in problem.stations),
+    ]
+    return " &\n  ".join(words) + "\n"
+
+
+def _grip(grip: Grip) -> str:
+    x, y = grip.direction
+    return f"grip {grip.name} {x:.17g} {y:.17g} {grip.drive:.17g} {grip.role}"

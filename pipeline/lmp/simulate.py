@@ -1,0 +1,100 @@
+"""One fracture test by LAMMPS: problem in, solution out."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import ConvergenceError, PipelineError
+from pipeline.core.problem import EnergyBalance, Problem, Solution
+from pipeline.lmp.deck import DECK, write_deck
+from pipeline.lmp.output import read_curve, read_frames, read_reached
+from pipeline.lmp.plugin import open_lammps
+
+
+def solve(problem: Problem, folder: Path | None = None) -> Solution:
+    """Run the problem through LAMMPS in this process.
+
+    Parameters
+    ----------
+    problem : Problem
+    folder : where deck and output are kept; a temporary folder by default
+
+    Raises
+    ------
+    ConvergenceError
+        if the gauge did not reach cmod_max
+    ToolchainError
+        if LAMMPS or the compiled style is missing
+    """
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _solve_in(problem, folder)
+    with tempfile.TemporaryDirectory(prefix="cohesive-bpm-") as temporary:
+        return _solve_in(problem, Path(temporary))
+
+
+def _solve_in(problem: Problem, folder: Path) -> Solution:
+    start = time.process_time()
+    write_deck(folder, problem)
+    run(folder)
+    return read_solution(problem, folder, time.process_time() - start)
+
+
+def run(folder: Path) -> None:
+    """Run the deck of a folder; LAMMPS writes its log and output there."""
+    home = Path.cwd()
+    instance = open_lammps(log=folder / "log.lammps")
+    try:
+        os.chdir(folder)
+        instance.file(DECK)
+    except Exception as error:
+        raise PipelineError(f"LAMMPS stopped in {folder}: {error}") from error
+    finally:
+        os.chdir(home)
+        instance.close()
+
+
+def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
+    """The solution from the files that a finished run left in `folder`."""
+    curve = read_curve(folder / "curve.txt")
+    cmod = curve["cmod_m"]
+    if cmod[-1] < problem.cmod_max:
+        raise ConvergenceError(
+            f"the gauge stopped at {cmod[-1] * 1e3:.4g} mm of {problem.cmod_max * 1e3:.4g} mm after {curve['step'][-1]:.0f} "
+            "steps: ask for less accuracy or a smaller cmod_max_mm"
+        )
+    stations, displacement = _at_stations(problem, folder, curve)
+    return Solution(
+        curve=LoadCurve(cmod / problem.cmod_rate, cmod, curve["load_n"], curve["load_line_m"]),
+        cmod=stations,
+        displacement=displacement,
+        reached=read_reached(folder / "bonds.dump", problem.bonds.pairs),
+        energy=EnergyBalance(*(float(curve[f"{k}_j"][-1]) for k in ("external", "stored", "dissipated", "kinetic", "damping"))),
+        quasi_static_error=float(curve["quasi_static_error"][-1]),
+        steps=int(curve["step"][-1]),
+        seconds=seconds,
+        engine="lammps",
+        converged=True,
+        message=f"the gauge reached {problem.cmod_max * 1e3:.4g} mm",
+    )
+
+
+def _at_stations(problem: Problem, folder: Path, curve: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Full fields moved along their own velocity from the frame to the station before it."""
+    frames = read_frames(folder / "frames.dump", problem.particles.count)
+    moved = [frame.position - problem.particles.position for frame in frames]
+    opened = np.array([problem.gauge.cmod(field) for field in moved])
+    reached = problem.stations[problem.stations <= opened.max(initial=-np.inf)]
+    fields = []
+    for station in reached:
+        after = int(np.argmax(opened >= station))
+        speed = problem.gauge.cmod(frames[after].velocity)
+        late = (opened[after] - station) / speed if speed > 0 else 0.0
+        fields.append(moved[after] - late * frames[after].velocity)
+    return reached, np.array(fields)
