@@ -32,6 +32,7 @@ FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
   accuracy = 0.01;
   omega = cmod_max = first_rate = highest_rate = lowest_rate = 0.0;
   patience = 1.0;
+  first_load = 0.0;
   work_step_damping = 0.0;
   parse(narg, arg);
   vector_flag = 1;
@@ -127,6 +128,8 @@ void FixCohesiveDrive::parse(int narg, char **arg)
       k += 4;
     } else if (strcmp(arg[k], "patience") == 0)
       number(patience);
+    else if (strcmp(arg[k], "load") == 0)
+      number(first_load);
     else
       error->all(FLERR, "fix cohesive/drive does not know '{}'", arg[k]);
   }
@@ -199,10 +202,14 @@ void FixCohesiveDrive::setup(int)
 {
   assign_masses();
   build_lists();
-  if (state.gauge_set == 0.0) {
+  if (state.started == 0.0) {
     double sum = gauge_sum();
     MPI_Allreduce(&sum, &state.cmod_zero, 1, MPI_DOUBLE, MPI_SUM, world);
-    state.gauge_set = 1.0;
+    state.peak = first_load;    // the specimen starts at the machine's speed: that energy came from the machine
+    double own = kinetic_energy();
+    MPI_Allreduce(&own, &state.kinetic, 1, MPI_DOUBLE, MPI_SUM, world);
+    state.work = state.lost_before = state.kinetic;
+    state.started = 1.0;
   }
   window = {};
   damping_rate = 2.0 * omega;
@@ -377,8 +384,9 @@ void FixCohesiveDrive::measure_lag()
   const double power = state.peak * state.rate * nevery * update->dt;
   const double now = power > 0.0 ? (lost - state.lost_before) / power : 0.0;
   state.lost_before = lost;
+  // rises at once, fades over a period
   const double share = std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
-  state.lag += share * (std::fabs(now) - state.lag);
+  state.lag = std::max(std::fabs(now), state.lag * (1.0 - share));
   state.error_sum += state.lag * state.lag * (state.cmod - state.last_cmod);
   state.error_weight += state.cmod - state.last_cmod;
   state.last_cmod = state.cmod;
@@ -399,8 +407,10 @@ void FixCohesiveDrive::choose_rate()
   if (highest_rate <= lowest_rate) return;
   const double target = accuracy;
   const double period = 2.0 * M_PI / omega;
-  const double wish = std::clamp(std::sqrt(target / std::max(state.lag, 1e-3 * target)), 0.5, 2.0);
-  double factor = std::pow(wish, nevery * update->dt / (patience * period));
+  const double wish = std::sqrt(target / std::max(state.lag, 1e-3 * target));
+  const double share = nevery * update->dt / period;
+  double factor = std::pow(wish, share * (wish < 1.0 ? patience : 1.0));
+  factor = std::clamp(factor, 0.5, 1.0 + share);
   factor = std::clamp(factor, lowest_rate / state.rate, highest_rate / state.rate);
   if (factor == 1.0) return;
   for (int i = 0; i < atom->nlocal; i++)

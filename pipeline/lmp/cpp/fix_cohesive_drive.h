@@ -59,7 +59,7 @@ class FixCohesiveDrive : public Fix {
 
   // everything that a restart has to bring back
   struct State {
-    double load_line, rate, cmod_zero, gauge_set;
+    double load_line, rate, cmod_zero, started;
     double work, damping, lost_before;
     double peak, lag, error_sum, error_weight;
     double cmod, load, load_line_mean, load_drive, load_react, stored, dissipated, kinetic;
@@ -92,7 +92,7 @@ class FixCohesiveDrive : public Fix {
   std::vector<int> gauge_atom;
   std::vector<double> gauge_weight;
 
-  double accuracy, omega, cmod_max, first_rate, highest_rate, lowest_rate, patience;
+  double accuracy, omega, cmod_max, first_rate, highest_rate, lowest_rate, patience, first_load;
   double damping_rate, mean_rate;
   std::vector<double> stations;
   double **mean_v;           // running mean of the velocity, x and y
