@@ -1,0 +1,1 @@
+"""Digital image correlation with subset splitting: crack paths are found, never given."""

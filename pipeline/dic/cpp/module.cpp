@@ -1,0 +1,173 @@
+// The door to Python: arrays in, arrays out; the interpreter is released while the core works.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+
+#include "pattern.hpp"
+#include "propagate.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace dic;
+
+namespace {
+
+using Grey = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Doubles = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Ints = nb::ndarray<const int, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using IntList = nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+template <class T> nb::object array(std::size_t rows, std::size_t columns, T *&data) {
+  data = new T[std::max<std::size_t>(rows * columns, 1)]();
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<T *>(p); });
+  const std::size_t shape[2] = {rows, columns};
+  return nb::cast(nb::ndarray<nb::numpy, T>(data, columns ? 2 : 1, shape, owner));
+}
+
+template <class T> nb::object list(std::size_t n, T *&data) {
+  data = new T[std::max<std::size_t>(n, 1)]();
+  nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<T *>(p); });
+  const std::size_t shape[1] = {n};
+  return nb::cast(nb::ndarray<nb::numpy, T>(data, 1, shape, owner));
+}
+
+void need(bool condition, const char *message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+
+std::vector<Warp> warps(const Doubles &rows) {
+  need(rows.shape(1) == 6, "a warp has 6 numbers: u, v, u_x, u_y, v_x, v_y");
+  std::vector<Warp> out(rows.shape(0));
+  const double *p = rows.data();
+  for (auto &w : out) w = {p[0], p[1], p[2], p[3], p[4], p[5]}, p += 6;
+  return out;
+}
+
+std::vector<Point> points_of(const Doubles &rows) {
+  need(rows.shape(1) == 2, "a point has 2 numbers: column, row");
+  std::vector<Point> out(rows.shape(0));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = {rows(i, 0), rows(i, 1)};
+  return out;
+}
+
+nb::dict unpack(const std::vector<PointResult> &results) {
+  const std::size_t n = results.size();
+  double *warp, *zncc, *residual, *level, *covariance, *contrast, *score, *line;
+  int *outcome, *iterations, *count;
+  nb::dict out;
+  out["warp"] = array<double>(n, 6, warp);
+  out["zncc"] = list<double>(n, zncc);
+  out["residual"] = list<double>(n, residual);
+  out["level"] = array<double>(n, 2, level);
+  out["covariance"] = array<double>(n, 3, covariance);
+  out["contrast"] = list<double>(n, contrast);
+  out["score"] = list<double>(n, score);
+  out["suspect"] = array<double>(n, 4, line);
+  out["outcome"] = list<int>(n, outcome);
+  out["iterations"] = list<int>(n, iterations);
+  out["count"] = list<int>(n, count);
+  for (std::size_t i = 0; i < n; ++i) {
+    const PointResult &r = results[i];
+    const Warp &w = r.fit.warp;
+    const double p[6] = {w.u, w.v, w.ux, w.uy, w.vx, w.vy};
+    std::copy_n(p, 6, warp + 6 * i);
+    zncc[i] = r.fit.zncc, residual[i] = r.fit.residual, contrast[i] = r.fit.contrast, score[i] = r.suspicion.score;
+    level[2 * i] = r.fit.gain, level[2 * i + 1] = r.fit.offset;
+    covariance[3 * i] = r.fit.inverse[0], covariance[3 * i + 1] = r.fit.inverse[7];
+    covariance[3 * i + 2] = r.fit.inverse[1];
+    const double s[4] = {r.suspicion.line.angle, r.suspicion.line.offset, r.suspicion.jump_u, r.suspicion.jump_v};
+    std::copy_n(s, 4, line + 4 * i);
+    outcome[i] = r.reached ? int(r.fit.outcome) : -1;
+    iterations[i] = r.fit.iterations, count[i] = r.count;
+  }
+  return out;
+}
+
+Settings settings(int half, int model, int max_iterations, double tolerance, double wander) {
+  need(half >= 2 && half <= 200, "half the subset size must be 2 to 200 px");
+  need(model >= 0 && model <= 2, "the model is 0 (translation), 1 (rigid) or 2 (affine)");
+  return {half, static_cast<Model>(model), max_iterations, tolerance, wander};
+}
+
+}  // namespace
+
+NB_MODULE(_correlate, m) {
+  nb::class_<Picture>(m, "Picture")
+      .def("__init__",
+           [](Picture *self, Grey grey) {
+             need(grey.shape(0) >= 8 && grey.shape(1) >= 8, "a picture needs 8 rows and 8 columns");
+             nb::gil_scoped_release release;
+             new (self) Picture(grey.data(), int(grey.shape(0)), int(grey.shape(1)));
+           })
+      .def_prop_ro("shape", [](const Picture &p) { return nb::make_tuple(p.rows(), p.columns()); });
+
+  nb::class_<Pattern>(m, "Pattern")
+      .def("__init__",
+           [](Pattern *self, Doubles blobs) {
+             need(blobs.shape(1) == 4, "a blob has 4 numbers: column, row, sigma, grey");
+             std::vector<Blob> rows(blobs.shape(0));
+             for (std::size_t i = 0; i < rows.size(); ++i)
+               rows[i] = {blobs(i, 0), blobs(i, 1), blobs(i, 2), blobs(i, 3)};
+             new (self) Pattern(std::move(rows));
+           })
+      .def("evaluate",
+           [](const Pattern &self, Doubles points, int threads) {
+             need(points.shape(1) == 2, "a point has 2 numbers: column, row");
+             float *grey;
+             nb::object out = list<float>(points.shape(0), grey);
+             {
+               nb::gil_scoped_release release;
+               self.evaluate(points.data(), points.shape(0), grey, threads);
+             }
+             return out;
+           },
+           "points"_a, "threads"_a = 1);
+
+  m.def(
+      "propagate",
+      [](const Picture &reference, const Picture &current, Doubles points, Ints neighbours, IntList seeds,
+         Doubles guesses, std::optional<Doubles> from, int half, int model, int max_iterations, double tolerance,
+         double wander, double accept, int threads) {
+        need(neighbours.shape(0) == points.shape(0) && neighbours.shape(1) == 8, "neighbours are points × 8");
+        need(seeds.shape(0) == guesses.shape(0), "one guess a seed");
+        const std::vector<Warp> carried = from ? warps(*from) : std::vector<Warp>{};
+        need(!from || carried.size() == points.shape(0), "one carried warp a point");
+        const Task task{&reference, &current, points_of(points), neighbours.data(), from ? carried.data() : nullptr,
+                        settings(half, model, max_iterations, tolerance, wander), accept, threads};
+        const std::vector<int> start(seeds.data(), seeds.data() + seeds.shape(0));
+        const std::vector<Warp> guess = warps(guesses);
+        std::vector<PointResult> results;
+        {
+          nb::gil_scoped_release release;
+          results = propagate(task, start, guess);
+        }
+        return unpack(results);
+      },
+      "reference"_a, "current"_a, "points"_a, "neighbours"_a, "seeds"_a, "guesses"_a, "carried"_a.none(), nb::kw_only(),
+      "half"_a, "model"_a, "max_iterations"_a, "tolerance"_a, "wander"_a, "accept"_a, "threads"_a);
+
+  m.def(
+      "match",
+      [](const Picture &reference, const Picture &current, Doubles points, Doubles guesses,
+         std::optional<Doubles> from, int half, int model, int max_iterations, double tolerance, double wander,
+         double accept, int threads) {
+        need(guesses.shape(0) == points.shape(0), "one guess a point");
+        const std::vector<Warp> carried = from ? warps(*from) : std::vector<Warp>{};
+        need(!from || carried.size() == points.shape(0), "one carried warp a point");
+        const Task task{&reference, &current, points_of(points), nullptr, from ? carried.data() : nullptr,
+                        settings(half, model, max_iterations, tolerance, wander), accept, threads};
+        const std::vector<Warp> guess = warps(guesses);
+        std::vector<PointResult> results;
+        {
+          nb::gil_scoped_release release;
+          results = match(task, guess.data());
+        }
+        return unpack(results);
+      },
+      "reference"_a, "current"_a, "points"_a, "guesses"_a, "carried"_a.none(), nb::kw_only(), "half"_a, "model"_a,
+      "max_iterations"_a, "tolerance"_a, "wander"_a, "accept"_a, "threads"_a);
+}
