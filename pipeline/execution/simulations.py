@@ -1,0 +1,147 @@
+"""Many simulations, each kept as soon as it is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from typing import Protocol
+
+from pipeline.core.errors import PipelineError
+from pipeline.core.problem import Problem, Solution
+from pipeline.execution.processes import LocalProcesses, WorkerLostError
+from pipeline.execution.progress import Progress, Silent
+
+Simulate = Callable[[Problem], Solution]
+
+
+class SolutionStore(Protocol):
+    """Where solutions are kept; a key that is contained is not simulated again."""
+
+    def __contains__(self, key: str) -> bool: ...
+    def put(self, key: str, solution: Solution) -> None: ...
+
+
+class SimulationError(PipelineError, RuntimeError):
+    """One or more of many simulations failed; the others were finished and kept."""
+
+    def __init__(self, failures: Mapping[str, BaseException], total: int):
+        super().__init__(failures, total)
+        self.failures = dict(failures)
+        self.total = total
+
+    def __str__(self) -> str:
+        by_message: dict[str, list[str]] = {}
+        for key, error in self.failures.items():
+            by_message.setdefault(f"{error}" or type(error).__name__, []).append(key)
+        head = f"{len(self.failures)} of {self.total} simulations failed, the others are kept"
+        return "\n".join([head, *(f"{', '.join(keys)}: {message}" for message, keys in by_message.items())])
+
+
+def run_all(
+    simulate: Simulate,
+    problems: Mapping[str, Problem],
+    store: SolutionStore,
+    *,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Simulate every problem whose key the store does not hold, and put each solution there as soon as it is finished.
+
+    Parameters
+    ----------
+    simulate : takes a Problem, returns a Solution; picklable (a function of a module, or functools.partial of one)
+    problems : key → Problem
+    store : SolutionStore; written by this process only
+    executor : any executor of concurrent.futures, left open; None: LocalProcesses(workers)
+    workers : int or None; number of local processes, None: as many as there are processors
+    progress : Progress or None
+
+    Raises
+    ------
+    SimulationError
+        at the end, if simulations failed; one whose process was lost is tried once more first
+    KeyboardInterrupt
+        at once, with a sentence on how to go on; what was finished is in the store
+    """
+    progress = progress or Silent()
+    wanted = {key: problem for key, problem in problems.items() if key not in store}
+    progress.begin(len(problems), len(problems) - len(wanted))
+    if not wanted:
+        return
+    own = LocalProcesses(workers)
+    batch = _Batch(simulate, wanted, store, own if executor is None else executor, progress)
+    try:
+        failures = batch.run()
+    except KeyboardInterrupt:
+        batch.keep_finished()
+        kept = sum(key in store for key in problems)
+        raise KeyboardInterrupt(
+            f"{kept} of {len(problems)} simulations are kept: give the same command again to go on from there"
+        ) from None
+    finally:
+        batch.cancel()
+        own.kill()
+    if failures:
+        raise SimulationError(failures, len(problems)) from next(iter(failures.values()))
+
+
+class _Batch:
+    """Simulations under way: which future belongs to which key, and who had a second try."""
+
+    def __init__(
+        self,
+        simulate: Simulate,
+        problems: Mapping[str, Problem],
+        store: SolutionStore,
+        executor: Executor,
+        progress: Progress,
+    ) -> None:
+        self.simulate, self.problems, self.store = simulate, problems, store
+        self.executor, self.progress = executor, progress
+        self.keys: dict[Future[Solution], str] = {}
+        self.retried: set[str] = set()
+        self.failures: dict[str, BaseException] = {}
+
+    def run(self) -> dict[str, BaseException]:
+        """Run everything; key → error of what failed."""
+        for key in self.problems:
+            self._submit(key)
+        while self.keys:
+            for future in wait(self.keys, return_when=FIRST_COMPLETED).done:
+                self._settle(future, self.keys[future])
+                del self.keys[future]
+        return self.failures
+
+    def keep_finished(self) -> None:
+        """Put what is finished but not yet put."""
+        for future, key in self.keys.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                self.store.put(key, future.result())
+
+    def cancel(self) -> None:
+        """Start nothing more."""
+        for future in self.keys:
+            future.cancel()
+
+    def _submit(self, key: str) -> None:
+        try:
+            self.keys[self.executor.submit(self.simulate, self.problems[key])] = key
+        except BrokenExecutor as error:
+            self._fail(key, error)
+
+    def _settle(self, future: Future[Solution], key: str) -> None:
+        error = future.exception()
+        if error is None:
+            self.store.put(key, future.result())
+            self.progress.done(key)
+        elif isinstance(error, WorkerLostError | BrokenExecutor) and key not in self.retried:
+            self.retried.add(key)
+            self.progress.lost(key, error)
+            self._submit(key)
+        else:
+            self._fail(key, error)
+
+    def _fail(self, key: str, error: BaseException) -> None:
+        self.failures[key] = error
+        self.progress.failed(key, error)
