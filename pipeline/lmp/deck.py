@@ -80,9 +80,8 @@ def _drive(problem: Problem, loading: Loading, modes: Modes) -> str:
         f"cmod {problem.cmod_max:.17g}",
         f"record {loading.record}",
         f"omega {modes.omega:.17g}",
-        f"accuracy {loading.lag:.17g}",
+        f"lag {loading.lag:.17g}",
         f"load {loading.first_load:.17g}",
-        f"patience {__import__('os').environ.get('PAT','10')}",
         f"rate {loading.first_rate:.17g} {loading.lowest_rate:.17g} {loading.highest_rate:.17g}",
         f"frames {len(problem.stations)} " + " ".join(f"{s:.17g}" for s in problem.stations),
     ]

@@ -1,4 +1,14 @@
-"""How fast to load: a rule from the lowest mode, the geometry and the accuracy asked for."""
+"""How fast to load: a rule from the lowest mode, the geometry and the accuracy asked for.
+
+The damping is relative to a running mean of the velocity, so a mode that drifts steadily feels no drag and
+the error of the load is of second order in the rate (measured). Two numbers follow:
+
+- the *highest rate*: at 1 % the undamaged specimen would be opened to the end of the test within
+  `PERIODS` periods of its lowest mode; for other accuracies the rate goes with their square root;
+- the *lag wanted*: fix cohesive/drive measures which share of the machine's power, at peak load, goes into
+  motion and drag, and slows down where the share exceeds `LAG` times the accuracy. The error of the load is
+  about 1.5 times, at most twice, the lag.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +19,25 @@ import numpy as np
 from pipeline.core.problem import Problem
 from pipeline.lmp.modes import Modes
 
+PERIODS = 40
+LAG = 0.5
+SLOWEST = 1 / 300  # of the highest rate; below it a run would not end
+LONGEST = 4000  # periods of the lowest mode until a run is given up
+RECORD = 20  # steps between two records, a fiftieth of a period or less
+
 
 @dataclass(frozen=True)
 class Loading:
-    """Machine speeds in m per step."""
+    """What fix cohesive/drive is told; the unit of time is the step.
+
+    Parameters
+    ----------
+    first_rate, lowest_rate, highest_rate : float, m per step; speed of the machine
+    lag : float; share of the machine's power at peak load that may go into motion and drag
+    first_load : float, N; load at first damage, stands for the peak load before it is known
+    record : int; steps between two records
+    steps_max : int; the run is given up after these
+    """
 
     first_rate: float
     lowest_rate: float
@@ -24,10 +49,19 @@ class Loading:
 
 
 def loading_rule(problem: Problem, modes: Modes) -> Loading:
+    """Choose the loading of a problem from its lowest mode and the accuracy asked for."""
     period = 2 * np.pi / modes.omega
     line = problem.cmod_max / modes.cmod
-    rate = line / (40 * period)* (problem.accuracy/0.01)**.5
-    return Loading(rate, rate/100, rate, problem.accuracy, first_damage_load(problem, modes), 20, 10_000_000)
+    highest = line / (PERIODS * period) * np.sqrt(problem.accuracy / 0.01)
+    return Loading(
+        first_rate=highest,
+        lowest_rate=SLOWEST * highest,
+        highest_rate=highest,
+        lag=LAG * problem.accuracy,
+        first_load=first_damage_load(problem, modes),
+        record=RECORD,
+        steps_max=int(LONGEST * period),
+    )
 
 
 def first_damage_load(problem: Problem, modes: Modes) -> float:

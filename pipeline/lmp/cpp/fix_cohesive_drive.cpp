@@ -23,17 +23,18 @@ using namespace FixConst;
 
 // share of the largest stable step at which the masses are set; the rest covers finite kinematics
 static constexpr double SAFETY = 0.9;
-static constexpr int NVECTOR = 16;
+// how much faster the rate falls than it rises
+static constexpr double HASTE = 10.0;
+// the load is off by up to about twice the lag (measured against the equilibrium engine)
+static constexpr double ERROR_PER_LAG = 2.0;
+static constexpr int NVECTOR = 15;
 
 FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), state{}, window{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr)
 {
   nevery = 20;
-  accuracy = 0.01;
-  omega = cmod_max = first_rate = highest_rate = lowest_rate = 0.0;
-  patience = 1.0;
-  first_load = 0.0;
-  work_step_damping = 0.0;
+  omega = lag_wanted = cmod_max = first_load = first_rate = lowest_rate = highest_rate = 0.0;
+  damping_now = 0.0;
   parse(narg, arg);
   vector_flag = 1;
   size_vector = NVECTOR;
@@ -114,30 +115,32 @@ void FixCohesiveDrive::parse(int narg, char **arg)
       need(n + 1);
       for (int i = 0; i < n; i++) stations.push_back(utils::numeric(FLERR, arg[k + 2 + i], false, lmp));
       k += n + 2;
-    } else if (strcmp(arg[k], "accuracy") == 0)
-      number(accuracy);
-    else if (strcmp(arg[k], "omega") == 0)
-      number(omega);
-    else if (strcmp(arg[k], "cmod") == 0)
-      number(cmod_max);
-    else if (strcmp(arg[k], "rate") == 0) {
+    } else if (strcmp(arg[k], "rate") == 0) {
       need(3);
       first_rate = utils::numeric(FLERR, arg[k + 1], false, lmp);
       lowest_rate = utils::numeric(FLERR, arg[k + 2], false, lmp);
       highest_rate = utils::numeric(FLERR, arg[k + 3], false, lmp);
       k += 4;
-    } else if (strcmp(arg[k], "patience") == 0)
-      number(patience);
-    else if (strcmp(arg[k], "load") == 0)
+    } else if (strcmp(arg[k], "omega") == 0) {
+      number(omega);
+    } else if (strcmp(arg[k], "lag") == 0) {
+      number(lag_wanted);
+    } else if (strcmp(arg[k], "cmod") == 0) {
+      number(cmod_max);
+    } else if (strcmp(arg[k], "load") == 0) {
       number(first_load);
-    else
+    } else {
       error->all(FLERR, "fix cohesive/drive does not know '{}'", arg[k]);
+    }
   }
   if (grips.empty() || gauge.empty()) error->all(FLERR, "fix cohesive/drive needs grips and a gauge");
   if (!(omega > 0.0)) error->all(FLERR, "omega = {:g} must be positive", omega);
   if (!(cmod_max > 0.0)) error->all(FLERR, "cmod = {:g} m must be positive", cmod_max);
-  if (!(accuracy > 0.0)) error->all(FLERR, "accuracy = {:g} must be positive", accuracy);
-  if (!(first_rate > 0.0)) error->all(FLERR, "rate = {:g} must be positive", first_rate);
+  if (!(lag_wanted > 0.0)) error->all(FLERR, "lag = {:g} must be positive", lag_wanted);
+  if (!(first_load > 0.0)) error->all(FLERR, "load = {:g} N must be positive", first_load);
+  if (!(lowest_rate > 0.0 && lowest_rate <= first_rate && first_rate <= highest_rate))
+    error->all(FLERR, "rates {:g} {:g} {:g} must be positive, and the first between lowest and highest", first_rate,
+               lowest_rate, highest_rate);
   if (nevery < 1) error->all(FLERR, "record = {} must be positive", nevery);
 }
 
@@ -335,7 +338,7 @@ void FixCohesiveDrive::initial_integrate(int)
   window.drive += drive;
   window.react += react;
   state.load_line += state.rate * dt;
-  work_step_damping += lost;
+  damping_now += lost;
 }
 
 double FixCohesiveDrive::kinetic_energy() const
@@ -359,7 +362,7 @@ void FixCohesiveDrive::record()
 {
   double stored, dissipated;
   bond->energies(stored, dissipated);
-  const double local[5] = {window.gauge, kinetic_energy(), work_step_damping, stored, dissipated};
+  const double local[5] = {window.gauge, kinetic_energy(), damping_now, stored, dissipated};
   double all[5];
   MPI_Allreduce(local, all, 5, MPI_DOUBLE, MPI_SUM, world);
   const double n = std::max(window.steps, 1.0);
@@ -374,7 +377,7 @@ void FixCohesiveDrive::record()
   state.load_line_mean = window.load_line / n;
   state.peak = std::max(state.peak, state.load);
   window = {};
-  work_step_damping = 0.0;
+  damping_now = 0.0;
 }
 
 // share of the machine's power, at peak load, that goes into motion and drag instead of the specimen
@@ -401,16 +404,14 @@ void FixCohesiveDrive::mark_frames()
   state.next_frame = next == stations.end() ? INFINITY : *next;
 }
 
-// faster where the lag is below what was asked for, slower where it is above
+// Drag and inertia act on the load with the square of the rate: so the rate follows the square root of
+// wanted over measured lag, down ten times as fast as up. Velocities and their running means are scaled
+// with it, which keeps the specimen on its path; the energy that this takes out counts as damping.
 void FixCohesiveDrive::choose_rate()
 {
-  if (highest_rate <= lowest_rate) return;
-  const double target = accuracy;
-  const double period = 2.0 * M_PI / omega;
-  const double wish = std::sqrt(target / std::max(state.lag, 1e-3 * target));
-  const double share = nevery * update->dt / period;
-  double factor = std::pow(wish, share * (wish < 1.0 ? patience : 1.0));
-  factor = std::clamp(factor, 0.5, 1.0 + share);
+  const double share = nevery * update->dt * omega / (2.0 * M_PI);
+  const double wish = std::sqrt(lag_wanted / std::max(state.lag, 1e-3 * lag_wanted));
+  double factor = std::clamp(std::pow(wish, share * (wish < 1.0 ? HASTE : 1.0)), 0.5, 1.0 + share);
   factor = std::clamp(factor, lowest_rate / state.rate, highest_rate / state.rate);
   if (factor == 1.0) return;
   for (int i = 0; i < atom->nlocal; i++)
@@ -418,10 +419,9 @@ void FixCohesiveDrive::choose_rate()
       atom->v[i][k] *= factor;
       mean_v[i][k] *= factor;
     }
-  state.damping += (1.0 - factor * factor) * state.kinetic;
-  state.lost_before += (1.0 - factor * factor) * state.kinetic;
+  const double before = state.kinetic;
   state.kinetic *= factor * factor;
-  state.lost_before -= (1.0 - factor * factor) * state.kinetic / (factor * factor);
+  state.damping += before - state.kinetic;
   state.rate *= factor;
 }
 
@@ -439,11 +439,10 @@ double FixCohesiveDrive::compute_vector(int k)
     case 8: return state.kinetic;
     case 9: return state.damping;
     case 10: return state.rate;
-    case 11: return state.error_weight > 0.0 ? std::sqrt(state.error_sum / state.error_weight) : 0.0;
+    case 11: return state.error_weight > 0.0 ? ERROR_PER_LAG * std::sqrt(state.error_sum / state.error_weight) : 0.0;
     case 12: return state.frame_due;
     case 13: return state.cmod >= cmod_max ? 1.0 : 0.0;
-    case 14: return state.lag;
-    default: return state.load_line;
+    default: return state.lag;
   }
 }
 

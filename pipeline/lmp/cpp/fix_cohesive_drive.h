@@ -92,12 +92,12 @@ class FixCohesiveDrive : public Fix {
   std::vector<int> gauge_atom;
   std::vector<double> gauge_weight;
 
-  double accuracy, omega, cmod_max, first_rate, highest_rate, lowest_rate, patience, first_load;
+  double omega, lag_wanted, cmod_max, first_load, first_rate, lowest_rate, highest_rate;
   double damping_rate, mean_rate;
   std::vector<double> stations;
   double **mean_v;           // running mean of the velocity, x and y
   double **stiffness;        // scratch of assign_masses
-  double work_step_damping;
+  double damping_now;
   bigint built_calls, built_step;
 };
 
