@@ -8,7 +8,9 @@
 #include <stdexcept>
 
 #include "pattern.hpp"
+#include "parallel.hpp"
 #include "propagate.hpp"
+#include "split.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -54,6 +56,11 @@ std::vector<Point> points_of(const Doubles &rows) {
   return out;
 }
 
+void put(const Warp &w, double *out) {
+  const double p[6] = {w.u, w.v, w.ux, w.uy, w.vx, w.vy};
+  std::copy_n(p, 6, out);
+}
+
 nb::dict unpack(const std::vector<PointResult> &results) {
   const std::size_t n = results.size();
   double *warp, *zncc, *residual, *level, *covariance, *contrast, *score, *line;
@@ -72,9 +79,7 @@ nb::dict unpack(const std::vector<PointResult> &results) {
   out["count"] = list<int>(n, count);
   for (std::size_t i = 0; i < n; ++i) {
     const PointResult &r = results[i];
-    const Warp &w = r.fit.warp;
-    const double p[6] = {w.u, w.v, w.ux, w.uy, w.vx, w.vy};
-    std::copy_n(p, 6, warp + 6 * i);
+    put(r.fit.warp, warp + 6 * i);
     zncc[i] = r.fit.zncc, residual[i] = r.fit.residual, contrast[i] = r.fit.contrast, score[i] = r.suspicion.score;
     level[2 * i] = r.fit.gain, level[2 * i + 1] = r.fit.offset;
     covariance[3 * i] = r.fit.inverse[0], covariance[3 * i + 1] = r.fit.inverse[7];
@@ -91,6 +96,39 @@ Settings settings(int half, int model, int max_iterations, double tolerance, dou
   need(half >= 2 && half <= 200, "half the subset size must be 2 to 200 px");
   need(model >= 0 && model <= 2, "the model is 0 (translation), 1 (rigid) or 2 (affine)");
   return {half, static_cast<Model>(model), max_iterations, tolerance, wander};
+}
+
+nb::dict unpack(const std::vector<SplitResult> &results) {
+  const std::size_t n = results.size();
+  double *near, *far, *line, *cost, *near_fit, *far_fit, *near_covariance, *far_covariance;
+  int *attempted, *matched, *count, *iterations;
+  nb::dict out;
+  out["near"] = array<double>(n, 6, near);
+  out["far"] = array<double>(n, 6, far);
+  out["line"] = array<double>(n, 2, line);
+  out["cost"] = array<double>(n, 3, cost);            // single, parted, swapped
+  out["near_fit"] = array<double>(n, 5, near_fit);    // zncc, residual, gain, offset, score
+  out["far_fit"] = array<double>(n, 5, far_fit);
+  out["near_covariance"] = array<double>(n, 36, near_covariance);
+  out["far_covariance"] = array<double>(n, 36, far_covariance);
+  out["attempted"] = list<int>(n, attempted);
+  out["far_matched"] = list<int>(n, matched);
+  out["count"] = array<int>(n, 2, count);
+  out["iterations"] = list<int>(n, iterations);
+  for (std::size_t i = 0; i < n; ++i) {
+    const SplitResult &r = results[i];
+    put(r.near.warp, near + 6 * i), put(r.far.warp, far + 6 * i);
+    const double l[2] = {r.line.angle, r.line.offset}, c[3] = {r.single, r.parted, r.swapped};
+    const double a[5] = {r.near.zncc, r.near.residual, r.near.gain, r.near.offset, r.near_score};
+    const double b[5] = {r.far.zncc, r.far.residual, r.far.gain, r.far.offset, r.far_score};
+    std::copy_n(l, 2, line + 2 * i), std::copy_n(c, 3, cost + 3 * i);
+    std::copy_n(a, 5, near_fit + 5 * i), std::copy_n(b, 5, far_fit + 5 * i);
+    std::copy_n(r.near.inverse.data(), 36, near_covariance + 36 * i);
+    std::copy_n(r.far.inverse.data(), 36, far_covariance + 36 * i);
+    attempted[i] = r.attempted, matched[i] = r.far_matched;
+    count[2 * i] = r.near_count, count[2 * i + 1] = r.far_count, iterations[i] = r.near.iterations;
+  }
+  return out;
 }
 
 }  // namespace
@@ -170,4 +208,44 @@ NB_MODULE(_correlate, m) {
       },
       "reference"_a, "current"_a, "points"_a, "guesses"_a, "carried"_a.none(), nb::kw_only(), "half"_a, "model"_a,
       "max_iterations"_a, "tolerance"_a, "wander"_a, "accept"_a, "threads"_a);
+
+  // Candidates of all points one after the other, rows of u, v, u_x, u_y, v_x, v_y, gain, offset; those of point i
+  // are the rows first[i] to first[i + 1].
+  m.def(
+      "split",
+      [](const Picture &reference, const Picture &current, Doubles points, Doubles candidates, IntList first,
+         double variance, std::optional<Doubles> from, std::optional<Doubles> far, std::optional<Doubles> lines,
+         int half, int model, int max_iterations, double tolerance, double wander, int threads) {
+        const std::size_t n = points.shape(0);
+        need(first.shape(0) == n + 1 && candidates.shape(1) == 8, "candidates are rows of 8 numbers, points + 1 starts");
+        for (std::size_t i = 0; i < n; ++i)
+          need(first(i) >= 0 && first(i) <= first(i + 1) && first(i + 1) <= int(candidates.shape(0)),
+               "the starts of the candidates must not decrease");
+        const std::vector<Point> centre = points_of(points);
+        const std::vector<Warp> near = from ? warps(*from) : std::vector<Warp>{}, beyond = far ? warps(*far) : near;
+        need(near.empty() || (near.size() == n && beyond.size() == n), "one carried warp a point");
+        need(!lines || (lines->shape(0) == n && lines->shape(1) == 2), "a line has an angle and an offset");
+        SplitSettings s;
+        s.fit = settings(half, model, max_iterations, tolerance, wander);
+        std::vector<SplitResult> results(n);
+        std::vector<SplitBench> work(std::max(threads, 1));
+        {
+          nb::gil_scoped_release release;
+          parallel_for(int(n), threads, [&](int i, int w) {
+            std::vector<Candidate> own;
+            for (int k = first(i); k < first(i + 1); ++k) {
+              const double *c = &candidates(k, 0);
+              own.push_back({{c[0], c[1], c[2], c[3], c[4], c[5]}, c[6], c[7]});
+            }
+            const Line line = lines ? Line{(*lines)(i, 0), (*lines)(i, 1)} : Line{};
+            const bool parted = lines && line.offset >= 0;
+            results[i] = split(reference, current, centre[i], own, variance, s, near.empty() ? nullptr : &near[i],
+                               parted && !beyond.empty() ? &beyond[i] : nullptr, parted ? &line : nullptr, work[w]);
+          });
+        }
+        return unpack(results);
+      },
+      "reference"_a, "current"_a, "points"_a, "candidates"_a, "first"_a, "variance"_a, "carried"_a.none(),
+      "far_carried"_a.none(), "lines"_a.none(), nb::kw_only(), "half"_a, "model"_a, "max_iterations"_a, "tolerance"_a,
+      "wander"_a, "threads"_a);
 }

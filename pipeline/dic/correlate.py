@@ -1,0 +1,239 @@
+"""Match a picture with its reference, point by point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.dic.core import core
+from pipeline.dic.correlation import Correlation
+from pipeline.dic.grid import Grid
+from pipeline.dic.noise import PARAMETERS, MatchNoise
+from pipeline.dic.parting import Match, Sheet, adopt, part
+from pipeline.dic.seeds import find
+from pipeline.dic.settings import Settings
+from pipeline.dic.status import Status
+
+_ROUNDS = 4  # of seeding: parts that no neighbour reaches get seeds of their own
+_SEEDS = 9
+_OUTCOMES = np.array([Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED])
+
+
+def checked(image: np.ndarray, what: str) -> np.ndarray:
+    """The grey values as float32, rows × columns.
+
+    Raises
+    ------
+    InputError
+        for anything but a finite picture with some contrast, at least 16 × 16 pixels
+    """
+    image = np.asarray(image)
+    if image.ndim != 2:
+        raise InputError(f"{what} has {image.ndim} dimensions (shape {image.shape}), expected rows × columns of grey values")
+    if image.dtype.kind not in "uif":
+        raise InputError(f"{what} holds values of type {image.dtype}, expected whole or real grey values")
+    if min(image.shape) < 16:
+        raise InputError(f"{what} has {image.shape[1]} × {image.shape[0]} px, expected at least 16 × 16")
+    if not np.isfinite(image).all():
+        raise InputError(f"{what} holds {int((~np.isfinite(image)).sum())} values that are not finite: fill or crop them")
+    if np.ptp(image) == 0:
+        raise InputError(f"{what} is blank: every pixel has the grey value {image.flat[0]:g}")
+    return np.ascontiguousarray(image, np.float32)
+
+
+class Reference:
+    """The picture that others are matched with, ready to be used many times.
+
+    Parameters
+    ----------
+    image : (rows, columns) array of grey values
+    settings : Settings
+    """
+
+    def __init__(self, image: np.ndarray, settings: Settings | None = None) -> None:
+        self.settings = settings or Settings()
+        self.image = checked(image, "the reference picture")
+        self.grid = Grid.over(self.image.shape, self.settings)  # type: ignore[arg-type]
+        self._picture: Any = core().Picture(self.image)
+
+    def correlate(self, image: np.ndarray, start: Correlation | None = None) -> Correlation:
+        """Match a picture.
+
+        Parameters
+        ----------
+        image : array of the reference's shape
+        start : Correlation, optional; of a picture shortly before, taken as the first guess
+
+        Raises
+        ------
+        InputError
+            if the picture cannot be used
+        ConvergenceError
+            if nothing of the reference is found again
+        """
+        grey = checked(image, "the deformed picture")
+        if grey.shape != self.image.shape:
+            raise InputError(f"the deformed picture is {grey.shape[1]} × {grey.shape[0]} px, the reference {self.image.shape[1]} × {self.image.shape[0]} px")
+        match = Match(core(), self._picture, core().Picture(grey), self.grid, self.settings)
+        return matched(match, self.image, grey, start)
+
+
+def correlate(reference: np.ndarray, deformed: np.ndarray, settings: Settings | None = None) -> Correlation:
+    """Displacements of a grid of points between two pictures, of one size, in grey values."""
+    return Reference(reference, settings).correlate(deformed)
+
+
+def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Correlation | None) -> Correlation:
+    """The whole chain: propagate, learn the noise, cut what one warp does not explain, judge."""
+    found = _from_start(match, start) if start is not None else _unreached(match.grid.size)
+    found = _seeded(match, reference, current, found)
+    good = _good(match, found)
+    if good.sum() < max(3, 0.02 * good.size):
+        raise ConvergenceError(
+            f"only {int(good.sum())} of {good.size} points of the reference are found in the picture: the motion may be "
+            f"larger than search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
+        )
+    noise = MatchNoise.learnt(found["residual"][good], found["count"][good], found["score"][good])
+    sheet = _sheet(match, found, noise)
+    if match.settings.split:
+        part(match, sheet, noise)
+    else:
+        _accept_whole(sheet, found, good, noise)
+    return _correlation(match, sheet, noise)
+
+
+def _unreached(n: int) -> dict[str, np.ndarray]:
+    widths = {"warp": 6, "level": 2, "covariance": 3, "suspect": 4}
+    found = {name: np.zeros((n, k)) for name, k in widths.items()}
+    found |= {name: np.zeros(n) for name in ("residual", "contrast", "score")}
+    return found | {
+        "zncc": np.full(n, -1.0),
+        "outcome": np.full(n, -1, np.int32),
+        "iterations": np.zeros(n, np.int32),
+        "count": np.zeros(n, np.int32),
+    }
+
+
+def _good(match: Match, found: dict[str, np.ndarray]) -> np.ndarray:
+    return (found["outcome"] == 0) & (found["zncc"] > match.settings.accept_zncc)
+
+
+def _from_start(match: Match, start: Correlation) -> dict[str, np.ndarray]:
+    """Every point from its own earlier warp."""
+    return match.core.match(
+        match.reference,
+        match.current,
+        match.grid.points,
+        np.ascontiguousarray(start.warp),
+        match.carried,
+        accept=match.settings.accept_zncc,
+        **match.settings.solver(),
+    )
+
+
+def _seeded(
+    match: Match, reference: np.ndarray, current: np.ndarray, found: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Propagate from seeds until no part of the grid is left that a seed can be found for."""
+    hopeless = np.zeros(match.grid.size, bool)
+    for _ in range(_ROUNDS):
+        good = _good(match, found)
+        spots = _spots(match.grid, ~good & ~hopeless)
+        if not spots.size:
+            break
+        hopeless[spots] = True
+        seeds, guesses = _search(match, reference, current, spots)
+        if not seeds.size:
+            continue
+        fresh = match.core.propagate(
+            match.reference,
+            match.current,
+            match.grid.points,
+            np.where(good[match.grid.neighbours], -1, match.grid.neighbours).astype(np.int32),
+            seeds,
+            guesses,
+            match.carried,
+            accept=match.settings.accept_zncc,
+            **match.settings.solver(),
+        )
+        better = ~good & (fresh["zncc"] > found["zncc"])
+        found = {name: np.where(better.reshape(-1, *[1] * (v.ndim - 1)), fresh[name], v) for name, v in found.items()}
+    return found
+
+
+def _spots(grid: Grid, missing: np.ndarray) -> np.ndarray:
+    """Nodes for seeds in the parts of the grid that are missing: spread over the largest, else the middle of each."""
+    if missing.all():
+        rows, columns = (np.unique(np.linspace(0.2, 0.8, 3) * (n - 1)).astype(int) for n in grid.shape)
+        return np.unique(rows[:, None] * grid.shape[1] + columns)
+    label, count = ndimage.label(missing.reshape(grid.shape), np.ones((3, 3)))
+    sizes = np.bincount(label.ravel())[1:]
+    large = [k for k in np.argsort(-sizes)[:_SEEDS] if sizes[k] >= 9]
+    depth = ndimage.distance_transform_cdt(np.pad(missing.reshape(grid.shape), 1))[1:-1, 1:-1]
+    return np.array([np.argmax(np.where(label == k + 1, depth, -1)) for k in large], int)
+
+
+def _search(
+    match: Match, reference: np.ndarray, current: np.ndarray, spots: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those spots that are found again, and their warps (k, 6)."""
+    half = match.settings.half + 8
+    seeds, guesses = [], []
+    for spot in spots:
+        carried = match.carried[spot] if match.carried is not None else np.zeros(6)
+        column, row = match.grid.points[spot] + carried[:2]
+        at = (round(column), round(row))
+        if not (0 <= at[0] < reference.shape[1] and 0 <= at[1] < reference.shape[0]):
+            continue
+        place = find(reference, current, at, half, match.settings.search_px)
+        if place is not None and place.certain:
+            seeds.append(spot)
+            guesses.append(carried + [*place.shift, 0, 0, 0, 0])
+    return np.array(seeds, np.int32), np.array(guesses, float).reshape(-1, 6)
+
+
+def _sheet(match: Match, found: dict[str, np.ndarray], noise: MatchNoise) -> Sheet:
+    n = match.grid.size
+    status = np.where(found["outcome"] < 0, Status.NOT_REACHED, _OUTCOMES[found["outcome"]])
+    status[status == Status.OK] = Status.POOR_MATCH
+    empty = {"line": 2, "far": 6, "jump": 2, "jump_std": 2}
+    sheet = Sheet(
+        **{k: found[k].copy() for k in ("warp", "zncc", "iterations", "covariance", "level", "suspect")},
+        **{k: np.full((n, width), np.nan) for k, width in empty.items()},
+        status=status.astype(np.uint8),
+        variance=np.full(n, np.inf),
+    )
+    adopt(sheet, np.arange(n), found, noise, better=False)
+    sheet.variance[~_good(match, found)] = np.inf
+    sheet.status[~_good(match, found) & sheet.sound] = Status.POOR_MATCH
+    return sheet
+
+
+def _accept_whole(sheet: Sheet, found: dict[str, np.ndarray], good: np.ndarray, noise: MatchNoise) -> None:
+    """Without cuts only the misfit decides."""
+    fits = good & (sheet.variance <= noise.limit(found["count"]))
+    sheet.status[fits] = Status.OK
+
+
+def _correlation(match: Match, sheet: Sheet, noise: MatchNoise) -> Correlation:
+    variance = np.where(np.isfinite(sheet.variance), np.maximum(sheet.variance, noise.variance), np.nan)
+    std = np.sqrt(np.maximum(sheet.covariance[:, :2], 0) * variance[:, None])
+    status = sheet.status.copy()
+    status[sheet.sound & ~(std.max(axis=1) <= match.settings.imprecise_px)] = Status.NO_CONTRAST
+    return Correlation(
+        grid=match.grid,
+        warp=sheet.warp,
+        status=status,
+        znssd=2 * (1 - sheet.zncc),
+        iterations=sheet.iterations,
+        std=std,
+        level=sheet.level,
+        line=sheet.line,
+        far=sheet.far,
+        jump=sheet.jump,
+        jump_std=sheet.jump_std,
+        noise=float(np.sqrt(noise.variance)),
+    )

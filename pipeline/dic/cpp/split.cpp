@@ -1,0 +1,191 @@
+#include "split.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lanes.hpp"
+
+namespace dic {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr int kLeastFar = 24;     // pixels; smaller parts are not matched
+constexpr int kLeastAffine = 72;  // pixels; smaller far parts keep the gradients they were given
+constexpr double kInnermost = 0.5, kOutermost = 4.5;  // px, of the band along the line that may be left out
+
+// Maps of clipped cost, one row a candidate; the last row stands for pixels that nothing matches.
+struct Maps {
+  int rows, pixels;
+  std::vector<float> cost;
+  float *row(int k) { return &cost[static_cast<std::size_t>(k) * pixels]; }
+  const float *row(int k) const { return &cost[static_cast<std::size_t>(k) * pixels]; }
+};
+
+struct Cut {
+  Line line;
+  int near = -1, far = -1;
+  double cost = std::numeric_limits<double>::max();
+};
+
+// Where the pixel beyond the border of the picture lies the cost is that of no match.
+void fill_cost(const Pixels &p, const Picture &current, Point centre, const Candidate &c, double variance, double clip,
+               Bench &bench, float *cost) {
+  if (misfit(p, current, centre, c.warp, c.gain, c.offset, bench) < 0) {
+    std::fill_n(cost, p.count, float(clip));
+    return;
+  }
+  for (int i = 0; i < p.count; ++i)
+    cost[i] = std::min(float(bench.error[i] * bench.error[i] / variance), float(clip));
+}
+
+// Sums of every map over strips along the direction (nx, ny).
+void sum_strips(const Pixels &p, const Maps &maps, double angle, double reach, double width, int count,
+                std::vector<float> &strips) {
+  const float nx = float(std::cos(angle)), ny = float(std::sin(angle));
+  strips.assign(static_cast<std::size_t>(count) * maps.rows, 0.0f);
+  for (int i = 0; i < p.count; ++i) {
+    const int s = int((nx * p.xi[i] + ny * p.eta[i] + reach) / width);
+    for (int k = 0; k < maps.rows; ++k) strips[static_cast<std::size_t>(k) * count + s] += maps.row(k)[i];
+  }
+}
+
+// The cheapest line over `angles` half-turn steps and offsets `width` apart. Either side takes its own cheapest map,
+// unless `near` and `far` are given.
+Cut best_cut(const Pixels &p, const Maps &maps, int half, int angles, double width, int near, int far,
+             std::vector<float> &strips) {
+  const double reach = half * std::sqrt(2.0) + 1;
+  const int count = int(2 * reach / width) + 1;
+  Cut best;
+  std::vector<double> below(maps.rows), total(maps.rows);
+  for (int a = 0; a < angles; ++a) {
+    const double angle = a * kPi / angles;
+    sum_strips(p, maps, angle, reach, width, count, strips);
+    for (int k = 0; k < maps.rows; ++k) {
+      total[k] = below[k] = 0;
+      for (int s = 0; s < count; ++s) total[k] += strips[static_cast<std::size_t>(k) * count + s];
+    }
+    for (int s = 0; s + 1 < count; ++s) {
+      int low = 0, high = 0;
+      for (int k = 0; k < maps.rows; ++k) {
+        below[k] += strips[static_cast<std::size_t>(k) * count + s];
+        if (below[k] < below[low]) low = k;
+        if (total[k] - below[k] < total[high] - below[high]) high = k;
+      }
+      const double offset = (s + 1) * width - reach;
+      if (near >= 0) low = offset >= 0 ? near : far, high = offset >= 0 ? far : near;
+      const double cost = below[low] + total[high] - below[high];
+      if (cost >= best.cost) continue;
+      best.cost = cost;
+      if (offset >= 0) best.line = {angle, offset}, best.near = low, best.far = high;
+      if (offset < 0) best.line = {angle + kPi, -offset}, best.near = high, best.far = low;
+    }
+  }
+  return best;
+}
+
+void distances(const Pixels &p, const Line &line, double sign, std::vector<float> &out) {
+  const float nx = float(sign * std::cos(line.angle)), ny = float(sign * std::sin(line.angle));
+  out.resize(p.count);
+  for (int i = 0; i < p.count; ++i) out[i] = nx * p.xi[i] + ny * p.eta[i] - float(sign * line.offset);
+}
+
+// The band along the line that does not match its own side: the gap, its blur and what a bent line leaves over.
+double band(const std::vector<float> &distance, const float *cost, double expected) {
+  constexpr int bins = int(kOutermost - kInnermost) + 1;
+  double sum[bins] = {}, number[bins] = {};
+  for (std::size_t i = 0; i < distance.size(); ++i) {
+    const int bin = int(std::floor(-distance[i]));
+    if (bin >= 0 && bin < bins) sum[bin] += cost[i], number[bin] += 1;
+  }
+  double margin = kInnermost;
+  for (int b = 0; b < bins; ++b)
+    if (sum[b] > expected * (number[b] + 4 * std::sqrt(2 * number[b] + 1))) margin = b + 1.5;
+  return std::min(margin, kOutermost);
+}
+
+struct Part {
+  const Picture &current;
+  Point centre;
+  Settings settings;
+  SplitBench &work;
+};
+
+// Match one side of the line; sign +1 the near one. False where it is too small or finds nothing.
+bool match_side(const Part &part, const Line &line, double sign, double margin, const Candidate &start, Fit &out,
+                int &count) {
+  SplitBench &w = part.work;
+  distances(w.all, line, sign, w.distance);
+  w.all.keep(w.distance, margin, w.part);
+  count = w.part.count;
+  if (count < kLeastFar) return false;
+  Settings s = part.settings;
+  if (count < kLeastAffine) s.model = Model::Translation;
+  out = fit(w.part, part.current, part.centre, start.warp, s, w.bench);
+  return out.outcome == Outcome::Converged && out.zncc > 0.3;
+}
+
+Candidate seen(const Fit &f) { return {f.warp, f.gain, f.offset}; }
+
+double total(const float *cost, int n) {
+  double s = 0;
+  for (int i = 0; i < n; ++i) s += cost[i];
+  return s;
+}
+
+}  // namespace
+
+SplitResult split(const Picture &reference, const Picture &current, Point centre,
+                  const std::vector<Candidate> &candidates, double variance, const SplitSettings &settings,
+                  const Warp *from, const Warp *far_from, const Line *known, SplitBench &work) {
+  SplitResult r;
+  const int half = settings.fit.half;
+  if (candidates.empty() || !gather(reference, centre, half, from, far_from, known, work.all)) return r;
+  const int n = work.all.count;
+  Maps maps{int(candidates.size()) + 1, n, {}};
+  maps.cost.resize(static_cast<std::size_t>(maps.rows) * n);
+  r.single = std::numeric_limits<double>::max();
+  for (int k = 0; k + 1 < maps.rows; ++k) {
+    fill_cost(work.all, current, centre, candidates[k], variance, settings.clip, work.bench, maps.row(k));
+    r.single = std::min(r.single, total(maps.row(k), n));
+  }
+  const int none = maps.rows - 1;
+  std::fill_n(maps.row(none), n, float(0.6 * settings.clip));
+  Cut cut = best_cut(work.all, maps, half, 24, 1.0, -1, -1, work.strips);
+  if (cut.near == none || cut.near < 0) return r;
+  Candidate near = candidates[cut.near], far = cut.far == none ? candidates[cut.near] : candidates[cut.far];
+  Maps two{3, n, std::vector<float>(static_cast<std::size_t>(3) * n, float(0.6 * settings.clip))};
+  const Part part{current, centre, settings.fit, work};
+  double near_margin = 1.5, far_margin = 1.5;
+  bool far_known = cut.far != none;
+  for (int round = 0; round < settings.rounds; ++round) {
+    const Line before = cut.line;
+    if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count)) return r;
+    near = seen(r.near);
+    r.far_matched = far_known && match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count);
+    if (r.far_matched) far = seen(r.far);
+    fill_cost(work.all, current, centre, near, variance, settings.clip, work.bench, two.row(0));
+    if (far_known) fill_cost(work.all, current, centre, far, variance, settings.clip, work.bench, two.row(1));
+    cut = best_cut(work.all, two, half, 48, 0.5, 0, far_known ? 1 : 2, work.strips);
+    distances(work.all, cut.line, 1, work.distance);
+    near_margin = band(work.distance, two.row(0), 1.0);
+    distances(work.all, cut.line, -1, work.distance);
+    far_margin = band(work.distance, two.row(1), 1.0);
+    const double turn = std::abs(std::remainder(cut.line.angle - before.angle, 2 * kPi));
+    if (round > 0 && turn < 0.08 && std::abs(cut.line.offset - before.offset) < 0.6) break;
+  }
+  r.attempted = true, r.line = cut.line, r.parted = cut.cost;
+  if (far_known) r.swapped = best_cut(work.all, two, half, 48, 0.5, 1, 0, work.strips).cost;
+  else r.swapped = std::numeric_limits<double>::max();
+  if (far_known) {
+    r.far_matched = match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count);
+    if (r.far_matched)
+      r.far_score = screen(work.part, work.bench.error.data(), r.far, r.far.residual / (r.far_count - 8), half).score;
+  }
+  if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count)) return r.attempted = false, r;
+  r.second = screen(work.part, work.bench.error.data(), r.near, r.near.residual / (r.near_count - 8), half);
+  r.near_score = r.second.score;
+  return r;
+}
+
+}  // namespace dic

@@ -1,0 +1,47 @@
+// A subset cut by a straight line: the line is searched over all angles and offsets, each part has its own warp.
+#pragma once
+#include <vector>
+
+#include "screen.hpp"
+
+namespace dic {
+
+// A motion seen near the subset, with the brightness it came with.
+struct Candidate {
+  Warp warp;
+  double gain = 1, offset = 0;
+};
+
+struct SplitResult {
+  bool attempted = false;
+  Line line;
+  Fit near, far;
+  int near_count = 0, far_count = 0;
+  bool far_matched = false;
+  double single = 0;         // cost of the best single warp: Σ min(e²/σ², clip) over the subset
+  double parted = 0;         // cost of the two warps on both sides of the line
+  double swapped = 0;        // least cost of a line that puts the centre on the other side
+  double near_score = 0;     // χ² for a second line through the near part
+  double far_score = 0;
+  Suspicion second;          // where that line lies
+};
+
+struct SplitSettings {
+  Settings fit;
+  double clip = 16;  // of e²/σ²: no pixel counts for more
+  int rounds = 4;
+};
+
+// Scratch memory of one thread.
+struct SplitBench {
+  Pixels all, part;
+  Bench bench;
+  std::vector<float> distance, cost, strips;
+};
+
+// `variance`: expected square of e at one pixel. `from`, `far_from`, `line` as in gather(), for a carried reference.
+SplitResult split(const Picture &reference, const Picture &current, Point centre,
+                  const std::vector<Candidate> &candidates, double variance, const SplitSettings &settings,
+                  const Warp *from, const Warp *far_from, const Line *known, SplitBench &work);
+
+}  // namespace dic
