@@ -34,7 +34,9 @@ class DisplacementField:
         expected = {"points": (n, 2), "displacement": (frames, n, 2), "std": (frames, n), "abscissa": (frames,)}
         for name, shape in expected.items():
             if np.shape(getattr(self, name)) != shape:
-                raise InputError(f"{name} of a displacement field has shape {np.shape(getattr(self, name))}, expected {shape}")
+                raise InputError(
+                    f"{name} of a displacement field has shape {np.shape(getattr(self, name))}, expected {shape}"
+                )
 
     def at(self, abscissa: np.ndarray) -> DisplacementField:
         """The field at other values of the abscissa, linearly between frames; invalid outside them."""

@@ -156,7 +156,8 @@ class Solution:
     curve : LoadCurve with load_line
     cmod : (frames,) array, m; CMOD of the full-field frames, the problem's stations as far as reached
     displacement : (frames, n, 2) array, m; of all particles
-    reached : (m,) array, m; largest opening each bond has seen (delta_reached), at the end
+    reached : (m,) array, m; largest opening each bond has seen (delta_reached), at the end; any value up
+        to delta_peak where it has not softened
     energy : EnergyBalance
     quasi_static_error : float; the engine's own estimate, relative
     steps : int; time steps or increments

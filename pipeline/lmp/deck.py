@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-
-import numpy as np
 
 from pipeline.core.problem import Grip, Problem
 from pipeline.lmp.data_file import write_data_file
 from pipeline.lmp.law_table import LawTable, law_table
-from pipeline.lmp.modes import Modes, lowest_modes
 from pipeline.lmp.loading import Loading, loading_rule
+from pipeline.lmp.modes import Modes, lowest_modes
 
 DECK = "fracture.lmp"
 
@@ -54,11 +51,9 @@ def _settings(problem: Problem, loading: Loading) -> str:
 
 
 def _coefficients(table: LawTable) -> str:
-    lines = ["# type k_n (N/m) f_max (N) delta_max (m)"]
+    lines = ["# type k_n (N/m) f_max (N) delta_max (m); inf: takes no damage"]
     for k, (row, name) in enumerate(zip(table.rows, table.name, strict=True), 1):
-        k_n, f_max, delta_max = row
-        rest = "elastic" if np.isinf(f_max) else f"{f_max:.17g} {delta_max:.17g}"
-        lines.append(f"bond_coeff {k} {k_n:.17g} {rest}  # {name}")
+        lines.append(f"bond_coeff {k} " + " ".join(f"{v:.17g}" for v in row) + f"  # {name}")
     return "\n".join(lines) + "\n"
 
 

@@ -71,9 +71,13 @@ def lowest_modes(problem: Problem) -> Modes:
     response = factor.solve(np.asarray(rows.T @ (spring * drive)).ravel())
     mass = np.repeat(masses(problem), 2)
     inverse = LinearOperator(held.shape, matvec=factor.solve, dtype=float)
-    lowest = eigsh(held, k=1, M=sparse.diags(mass).tocsc(), sigma=0.0, OPinv=inverse, return_eigenvectors=False, tol=1e-3)
+    lowest = eigsh(
+        held, k=1, M=sparse.diags(mass).tocsc(), sigma=0.0, OPinv=inverse, return_eigenvectors=False, tol=1e-3
+    )
     field = response.reshape(-1, 2)
-    load = sum(spring * (g.drive - row @ response) for g, row in zip(problem.grips, grips, strict=True) if g.role == "drive")
+    load = sum(
+        spring * (g.drive - row @ response) for g, row in zip(problem.grips, grips, strict=True) if g.role == "drive"
+    )
     return Modes(float(np.sqrt(lowest[0])), field, float(load), problem.gauge.cmod(field))
 
 

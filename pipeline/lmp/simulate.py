@@ -75,7 +75,9 @@ def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
         cmod=stations,
         displacement=displacement,
         reached=read_reached(folder / "bonds.dump", problem.bonds.pairs),
-        energy=EnergyBalance(*(float(curve[f"{k}_j"][-1]) for k in ("external", "stored", "dissipated", "kinetic", "damping"))),
+        energy=EnergyBalance(
+            *(float(curve[f"{k}_j"][-1]) for k in ("external", "stored", "dissipated", "kinetic", "damping"))
+        ),
         quasi_static_error=float(curve["quasi_static_error"][-1]),
         steps=int(curve["step"][-1]),
         seconds=seconds,

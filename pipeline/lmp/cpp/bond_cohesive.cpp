@@ -66,9 +66,11 @@ void BondCohesive::settings(int narg, char **arg)
 
 void BondCohesive::read_law(int type, double k_n, double f_max, double delta_max)
 {
-  if (!(k_n > 0.0) || !std::isfinite(k_n)) error->all(FLERR, "k_n = {:g} N/m must be positive and finite", k_n);
+  if (!(k_n > 0.0) || !std::isfinite(k_n)) error->all(FLERR, "k_n = {:g} N/m must be finite and positive", k_n);
+  if (!(f_max > 0.0)) error->all(FLERR, "f_max = {:g} N must be positive (inf: the bond takes no damage)", f_max);
   if (std::isfinite(f_max)) {
-    if (!(f_max > 0.0)) error->all(FLERR, "f_max = {:g} N must be positive", f_max);
+    if (!(delta_max > 0.0) || !std::isfinite(delta_max))
+      error->all(FLERR, "delta_max = {:g} m must be finite and positive", delta_max);
     if (!(delta_max > f_max / k_n))
       error->all(FLERR, "delta_max = {:g} m must be larger than delta_peak = f_max/k_n = {:g} m: raise delta_max or lower f_max",
                  delta_max, f_max / k_n);
@@ -77,20 +79,17 @@ void BondCohesive::read_law(int type, double k_n, double f_max, double delta_max
   setflag[type] = 1;
 }
 
-// bond_coeff TYPE K_N F_MAX DELTA_MAX, or bond_coeff TYPE K_N elastic
+// bond_coeff TYPE K_N F_MAX DELTA_MAX; f_max and delta_max may be inf
 void BondCohesive::coeff(int narg, char **arg)
 {
-  const bool elastic = narg == 3 && strcmp(arg[2], "elastic") == 0;
-  if (!elastic && narg != 4)
-    error->all(FLERR, "bond_coeff of cohesive takes a type, k_n, f_max and delta_max, or a type, k_n and 'elastic'");
+  if (narg != 4) error->all(FLERR, "bond_coeff of cohesive takes a type, k_n, f_max and delta_max");
   if (!allocated) allocate();
   int low, high;
   utils::bounds(FLERR, arg[0], 1, atom->nbondtypes, low, high, error);
-  const double k_n = utils::numeric(FLERR, arg[1], false, lmp);
-  const double f_max = elastic ? INFINITY : utils::numeric(FLERR, arg[2], false, lmp);
-  const double delta_max = elastic ? INFINITY : utils::numeric(FLERR, arg[3], false, lmp);
-  if (!elastic && !std::isfinite(f_max)) error->all(FLERR, "f_max = {:g} N must be finite", f_max);
-  for (int type = low; type <= high; type++) read_law(type, k_n, f_max, delta_max);
+  const auto number = [&](const char *word) {
+    return strcmp(word, "inf") == 0 ? INFINITY : utils::numeric(FLERR, word, false, lmp);
+  };
+  for (int type = low; type <= high; type++) read_law(type, number(arg[1]), number(arg[2]), number(arg[3]));
 }
 
 void BondCohesive::init_style()
@@ -354,10 +353,7 @@ void BondCohesive::write_data(FILE *fp)
 {
   for (int type = 1; type <= atom->nbondtypes; type++) {
     const auto &own = law[type];
-    if (own.damageable())
-      utils::print(fp, "{} {:.17g} {:.17g} {:.17g}\n", type, own.k_n, own.f_max, own.delta_max);
-    else
-      utils::print(fp, "{} {:.17g} elastic\n", type, own.k_n);
+    utils::print(fp, "{} {:.17g} {:.17g} {:.17g}\n", type, own.k_n, own.f_max, own.delta_max);
   }
 }
 
