@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -78,8 +78,8 @@ class LoadCurve:
         """The curve up to the first row whose CMOD (m) exceeds `cmod`."""
         beyond = np.flatnonzero(self.cmod > cmod)
         stop = slice(None, max(int(beyond[0]) + 1, 3)) if beyond.size else slice(None)
-        cut = {k: None if v is None else v[stop] for k, v in vars(self).items()}
-        return replace(self, **cut)
+        cut = {k: v[stop] for k, v in vars(self).items() if v is not None}
+        return LoadCurve(**cut)
 
 
 def _around(mask: np.ndarray, index: int) -> slice:

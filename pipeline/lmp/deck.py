@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from importlib.resources import as_file, files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from pipeline.core.problem import Grip, Problem
@@ -30,7 +31,7 @@ def write_deck(folder: Path, problem: Problem) -> Loading:
     return loading
 
 
-def deck_source():
+def deck_source() -> Traversable:
     """Folder of the plain decks: inside the installed package, or at the top of a checkout."""
     packed = files("pipeline") / "lammps_inputs"
     return packed if packed.is_dir() else Path(__file__).resolve().parents[2] / "lammps_inputs"

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from pipeline.core.problem import Problem
+from pipeline.core.problem import Grip, Problem, Role
 
 SAFETY = 0.9  # of the largest stable time step, as in fix_cohesive_drive.cpp
 
@@ -23,7 +23,6 @@ class Modes:
     response : (n, 2) array; elastic displacement per unit machine displacement
     stiffness : float, N/m; load per unit machine displacement
     cmod : float; CMOD per unit machine displacement
-    lag : float; largest displacement error (of unit machine displacement) per unit acceleration, steps²
     """
 
     omega: float
@@ -71,17 +70,15 @@ def lowest_modes(problem: Problem) -> Modes:
     response = factor.solve(np.asarray(rows.T @ (spring * drive)).ravel())
     mass = np.repeat(masses(problem), 2)
     inverse = LinearOperator(held.shape, matvec=factor.solve, dtype=float)
-    lowest = eigsh(
-        held, k=1, M=sparse.diags(mass).tocsc(), sigma=0.0, OPinv=inverse, return_eigenvectors=False, tol=1e-3
-    )
+    options = {"sigma": 0.0, "OPinv": inverse, "return_eigenvectors": False, "tol": 1e-3}
+    lowest = eigsh(held, k=1, M=sparse.diags(mass).tocsc(), **options)
     field = response.reshape(-1, 2)
-    load = sum(
-        spring * (g.drive - row @ response) for g, row in zip(problem.grips, grips, strict=True) if g.role == "drive"
-    )
+    slip = drive - rows @ response
+    load = spring * sum(s for s, grip in zip(slip, problem.grips, strict=True) if grip.role is Role.DRIVE)
     return Modes(float(np.sqrt(lowest[0])), field, float(load), problem.gauge.cmod(field))
 
 
-def _row(problem: Problem, grip) -> np.ndarray:
+def _row(problem: Problem, grip: Grip) -> np.ndarray:
     row = np.zeros((problem.particles.count, 2))
     row[grip.index] = grip.weight[:, None] * grip.direction
     return row.ravel()

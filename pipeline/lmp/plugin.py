@@ -29,7 +29,7 @@ def library() -> Path:
     path = Path(folder()) / LIBRARY
     if not path.is_file():
         raise ToolchainError(
-            f"the compiled LAMMPS style {path} does not exist: install the package with a C++ compiler (g++) on the path"
+            f"the compiled LAMMPS style {path} does not exist: install the package where a C++ compiler (g++) is found"
         )
     return path
 

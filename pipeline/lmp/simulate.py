@@ -16,6 +16,8 @@ from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.output import read_curve, read_frames, read_reached
 from pipeline.lmp.plugin import open_lammps
 
+ENERGIES = ("external", "stored", "dissipated", "kinetic", "damping")
+
 
 def solve(problem: Problem, folder: Path | None = None) -> Solution:
     """Run the problem through LAMMPS in this process.
@@ -66,8 +68,8 @@ def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
     cmod = curve["cmod_m"]
     if cmod[-1] < problem.cmod_max:
         raise ConvergenceError(
-            f"the gauge stopped at {cmod[-1] * 1e3:.4g} mm of {problem.cmod_max * 1e3:.4g} mm after {curve['step'][-1]:.0f} "
-            "steps: ask for less accuracy or a smaller cmod_max_mm"
+            f"the gauge stopped at {cmod[-1] * 1e3:.4g} mm of {problem.cmod_max * 1e3:.4g} mm after "
+            f"{curve['step'][-1]:.0f} steps: ask for less accuracy or a smaller cmod_max_mm"
         )
     stations, displacement = _at_stations(problem, folder, curve)
     return Solution(
@@ -75,9 +77,7 @@ def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
         cmod=stations,
         displacement=displacement,
         reached=read_reached(folder / "bonds.dump", problem.bonds.pairs),
-        energy=EnergyBalance(
-            *(float(curve[f"{k}_j"][-1]) for k in ("external", "stored", "dissipated", "kinetic", "damping"))
-        ),
+        energy=EnergyBalance(**{k: float(curve[f"{k}_j"][-1]) for k in ENERGIES}),
         quasi_static_error=float(curve["quasi_static_error"][-1]),
         steps=int(curve["step"][-1]),
         seconds=seconds,

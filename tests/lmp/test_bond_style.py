@@ -19,7 +19,7 @@ LENGTH = 6e-4
 K_N, F_MAX, DELTA_MAX = 3.7e8, 71.0, 1.14e-4
 PEAK = F_MAX / K_N
 # up, back, into compression, farther, past failure, compressed after failure, and open again
-PATH = np.array([0.4, 1.0, 3.0, 1.5, -2.0, 2.0, 100.0, 30.0, 400.0, 700.0, -5.0, 50.0, 0.0]) * PEAK
+PATH = np.array([0.4, 1.01, 3.0, 1.5, -2.0, 2.0, 100.0, 30.0, 400.0, 700.0, -5.0, 50.0, 0.0]) * PEAK
 SMALL = "kinematics small"
 FINITE = "kinematics finite"
 
