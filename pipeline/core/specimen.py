@@ -242,7 +242,8 @@ class DiskCompactTension:
             ),
             (
                 total > self.diameter,
-                f"edge_to_load_line_mm + width_mm = {total / MM:g} must be within diameter_mm = {self.diameter / MM:g}",
+                f"edge_to_load_line_mm + width_mm = {total / MM:g} must not exceed diameter_mm = "
+                f"{self.diameter / MM:g}",
             ),
             (
                 self.pin_spacing <= self.pin_diameter,

@@ -215,6 +215,6 @@ def smooth_pair(size: int = 1000, seed: int = 1) -> Pair:
 def crack_pair(size: int = 1000, seed: int = 1, theta: float = 0.004) -> Pair:
     """The crack pair of the contract: column 499.5 below row 400, halves moved apart by ±θ (row − 400)₊."""
     cut = Cut(
-        tip=(size / 2 - 0.5, 0.4 * size), angle=np.pi / 2, jump=(-1.0, 0.0), profile=lambda xi: 2 * theta * xi
-    )  # ξ runs down the rows, η towards smaller columns: a negative jump opens
+        tip=(size / 2 - 0.5, 0.4 * size), angle=np.pi / 2, jump=(1.0, 0.0), profile=lambda xi: 2 * theta * xi
+    )  # ξ runs down the rows, η towards smaller columns
     return photograph_pair(Cracked((cut,)), (size, size), seed)

@@ -100,7 +100,7 @@ double band(const std::vector<float> &distance, const float *cost, double expect
   }
   double margin = kInnermost;
   for (int b = 0; b < bins; ++b)
-    if (sum[b] > expected * (number[b] + 4 * std::sqrt(2 * number[b] + 1))) margin = b + 1.5;
+    if (sum[b] > expected * (number[b] + 2.5 * std::sqrt(2 * number[b] + 1))) margin = b + 1.5;
   return std::min(margin, kOutermost);
 }
 
