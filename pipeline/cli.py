@@ -1,0 +1,237 @@
+"""The command line: each command reads its options, calls one function of `study` and says where the result lies.
+
+Everything that computes is imported inside the commands, so that `--help` is quick.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline import __version__
+from pipeline.core.errors import UnavailableError
+from pipeline.options import (
+    Accuracy,
+    Bundle,
+    Config,
+    Debug,
+    DeltaMax,
+    Effect,
+    Engine,
+    EngineChoice,
+    Fields,
+    FMax,
+    Geometry,
+    Grid,
+    LoadNoise,
+    NoisePx,
+    ObjectiveChoice,
+    Out,
+    Radius,
+    Record,
+    Scale,
+    Seed,
+    Start,
+    TrueDeltaMax,
+    TrueFMax,
+    Version,
+    Workers,
+    option,
+)
+from pipeline.terminal import Display, exit_codes
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.callback()
+def common(
+    version: Version = False,
+) -> None:
+    """Cohesive fracture properties of asphalt and concrete from images of a fracture test."""
+
+
+def refuse_until_built(**options: object) -> None:
+    """Refuse options whose feature is not part of this version.
+
+    Raises
+    ------
+    UnavailableError
+        naming the options that were given
+    """
+    given = ["--" + name.replace("_", "-") for name, value in options.items() if value]
+    if given:
+        raise UnavailableError(f"not available in version {__version__}: {', '.join(given)}; leave it out")
+
+
+def finish(summary: str | None, place: Path) -> None:
+    """Print what a command found and where the result lies."""
+    if summary:
+        print(summary)
+    print(f"result: {place}")
+
+
+@app.command()
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make.")],
+    geometry: Annotated[Geometry, option("--geometry", help="Specimen.")],
+    record: Record = None,
+    debug: Debug = False,
+) -> None:
+    """Make an experiment bundle to fill in."""
+    with exit_codes(debug):
+        from pipeline.study.new import new as make
+
+        finish(make(folder, geometry=geometry, record=record), folder)
+
+
+@app.command()
+def check(bundle: Bundle, debug: Debug = False) -> None:
+    """Validate a bundle and list every problem at once."""
+    with exit_codes(debug):
+        from pipeline.study.check import check as validate
+
+        finish(validate(bundle), bundle)
+
+
+@app.command()
+def model(
+    bundle: Bundle,
+    out: Out,
+    radius_mm: Radius = None,
+    config: Config = None,
+    workers: Workers = None,
+    seed: Seed = 0,
+    debug: Debug = False,
+) -> None:
+    """Build the bonded-particle model of a specimen, and draw it."""
+    with exit_codes(debug), Display() as progress:
+        from pipeline.study.model import model as build
+
+        summary = build(bundle, out, radius_mm=radius_mm, config=config, progress=progress)
+    finish(summary, out)
+
+
+@app.command()
+def simulate(
+    bundle: Bundle,
+    out: Out,
+    f_max: FMax,
+    delta_max: DeltaMax,
+    engine: EngineChoice = Engine.LAMMPS,
+    radius_mm: Radius = None,
+    accuracy: Accuracy = 0.01,
+    law: Annotated[str | None, option("--law", metavar="NAME", help="Softening instead of the bundle's.")] = None,
+    effect: Effect = None,
+    config: Config = None,
+    workers: Workers = None,
+    seed: Seed = 0,
+    debug: Debug = False,
+) -> None:
+    """Simulate one fracture test."""
+    with exit_codes(debug), Display() as progress:
+        refuse_until_built(law=law, effect=effect)
+        from pipeline.study.simulate import simulate as run
+
+        summary = run(
+            bundle,
+            out,
+            f_max=f_max,
+            delta_max=delta_max,
+            engine=engine,
+            radius_mm=radius_mm,
+            accuracy=accuracy,
+            config=config,
+            progress=progress,
+        )
+    finish(summary, out)
+
+
+@app.command()
+def identify(
+    bundle: Bundle,
+    out: Out,
+    engine: EngineChoice = Engine.LAMMPS,
+    grid: Grid = "0.8,0.9,1,1.1,1.2",
+    objective: ObjectiveChoice = None,
+    radius_mm: Radius = None,
+    accuracy: Accuracy = 0.01,
+    fields: Fields = None,
+    viscoelastic: Annotated[bool, option("--viscoelastic", help="Let the mastic creep.")] = False,
+    levelling: Annotated[bool, option("--levelling", help="Level the estimate for the grid's resolution.")] = False,
+    config: Config = None,
+    workers: Workers = None,
+    seed: Seed = 0,
+    debug: Debug = False,
+) -> None:
+    """Estimate f_max and delta_max of the mastic from a test."""
+    with exit_codes(debug), Display() as progress:
+        refuse_until_built(viscoelastic=viscoelastic, levelling=levelling)
+        from pipeline.study.identify import identify as estimate
+
+        summary = estimate(
+            bundle,
+            out,
+            engine=engine,
+            grid=grid,
+            objective=objective,
+            radius_mm=radius_mm,
+            accuracy=accuracy,
+            fields=fields,
+            config=config,
+            workers=workers,
+            seed=seed,
+            progress=progress,
+        )
+    finish(summary, out)
+
+
+@app.command("virtual-test")
+def virtual_test(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Bundle to make.")],
+    geometry: Annotated[Geometry | None, option("--geometry", help="Specimen; seb unless --like says other.")] = None,
+    specimen: Annotated[Path | None, option("--specimen", metavar="IMAGE", help="Photograph or label image.")] = None,
+    like: Annotated[Path | None, option("--like", metavar="BUNDLE", help="Bundle whose test is imitated.")] = None,
+    creep: Annotated[Path | None, option("--creep", metavar="FILE", help="Creep compliance of the mastic.")] = None,
+    f_max: TrueFMax = None,
+    delta_max: TrueDeltaMax = None,
+    start: Start = None,
+    radius_mm: Radius = None,
+    mm_per_px: Scale = None,
+    effect: Effect = None,
+    images: Annotated[bool, option("--images", help="Speckle images instead of displacement fields.")] = False,
+    noise_px: NoisePx = 0.01,
+    load_noise_n: LoadNoise = 0.0,
+    config: Config = None,
+    workers: Workers = None,
+    seed: Seed = 0,
+    debug: Debug = False,
+) -> None:
+    """Make a bundle with known truth by another kind of model."""
+    with exit_codes(debug), Display() as progress:
+        refuse_until_built(creep=creep, effect=effect, images=images)
+        from pipeline.study.virtual_test import virtual_test as make
+
+        summary = make(
+            out,
+            geometry=geometry,
+            specimen=specimen,
+            like=like,
+            f_max=f_max,
+            delta_max=delta_max,
+            start=start,
+            radius_mm=radius_mm,
+            mm_per_px=mm_per_px,
+            noise_px=noise_px,
+            load_noise_n=load_noise_n,
+            config=config,
+            seed=seed,
+            progress=progress,
+        )
+    finish(summary, out)
+
+
+def main() -> None:
+    """The command `cohesive-bpm`."""
+    app(prog_name="cohesive-bpm")

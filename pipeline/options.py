@@ -1,0 +1,145 @@
+"""The options of the command line: what they are called, how they are read, which values are refused."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pipeline import __version__
+
+
+class Geometry(StrEnum):
+    """Specimen geometries."""
+
+    SEB = "seb"
+    DCT = "dct"
+
+
+class Engine(StrEnum):
+    """Engines that simulate."""
+
+    LAMMPS = "lammps"
+    EQUILIBRIUM = "equilibrium"
+    REFERENCE = "reference"
+
+
+class Objective(StrEnum):
+    """What `identify` compares."""
+
+    FIELDS = "fields"
+    LOAD = "load"
+    BOTH = "both"
+
+
+def positive(text: str) -> float:
+    """A number above zero."""
+    value = number(text)
+    if not value > 0:
+        raise typer.BadParameter(f"{text} must be above zero")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A number that is zero or above."""
+    value = number(text)
+    if value < 0:
+        raise typer.BadParameter(f"{text} must not be negative")
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise typer.BadParameter(f"{text!r} is not a number")
+    return value
+
+
+def factors(text: str) -> tuple[float, ...]:
+    """Numbers above zero, separated by commas, each larger than the one before."""
+    values = tuple(positive(part) for part in text.split(","))
+    if len(values) < 2 or any(b <= a for a, b in pairwise(values)):
+        raise typer.BadParameter(f"{text!r} must be two or more increasing factors, as in 0.8,0.9,1,1.1,1.2")
+    return values
+
+
+def start_point(text: str) -> tuple[float, float]:
+    """f_max in N and delta_max in m, separated by a comma."""
+    values = [positive(part) for part in text.split(",")]
+    if len(values) != 2:
+        raise typer.BadParameter(f"{text!r} must be f_max in N and delta_max in m, as in 71,1.14e-4")
+    return values[0], values[1]
+
+
+def named_number(text: str) -> tuple[str, float]:
+    """NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise typer.BadParameter(f"{text!r} must be NAME=VALUE, as in fixture_compliance_um_per_kn=20")
+    return name, number(value)
+
+
+def show_version(wanted: bool) -> None:
+    """Print the version and leave."""
+    if wanted:
+        print(__version__)
+        raise typer.Exit
+
+
+def option(*names: str, help: str, metavar: str | None = None, **more: Any) -> Any:
+    """An option of a command."""
+    return typer.Option(*names, help=help, metavar=metavar, **more)
+
+
+Bundle = Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of the experiment.")]
+Out = Annotated[Path, option("-o", "--out", metavar="OUT", help="Folder for the results; a stopped run goes on in it.")]
+Radius = Annotated[
+    float | None,
+    option("--radius-mm", metavar="R", parser=positive, help="Particle radius instead of the bundle's; f_max follows."),
+]
+EngineChoice = Annotated[Engine, option("--engine", help="What simulates.")]
+Accuracy = Annotated[
+    float, option("--accuracy", metavar="E", parser=positive, help="Quasi-static error asked for, relative.")
+]
+Fields = Annotated[Path | None, option("--fields", metavar="FILE", help="Displacement fields instead of the bundle's.")]
+Config = Annotated[Path | None, option("--config", metavar="FILE", help="Settings of the run (TOML).")]
+Workers = Annotated[
+    int | None, option("--workers", metavar="N", min=1, help="Processes at a time; as many as processors if left out.")
+]
+Seed = Annotated[int, option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+Effect = Annotated[
+    list[Any] | None,
+    option("--effect", metavar="NAME=VALUE", parser=named_number, help="Something the model leaves out; repeatable."),
+]
+Debug = Annotated[bool, option("--debug", help="Show the traceback of an error.")]
+FMax = Annotated[float, option("--f-max", metavar="N", parser=positive, help="Strength of a bond, in N.")]
+DeltaMax = Annotated[float, option("--delta-max", metavar="M", parser=positive, help="Critical opening, in m.")]
+TrueFMax = Annotated[float | None, option("--f-max", metavar="N", parser=positive, help="True f_max, in N.")]
+TrueDeltaMax = Annotated[
+    float | None, option("--delta-max", metavar="M", parser=positive, help="True delta_max, in m.")
+]
+Grid = Annotated[
+    Any, option("--grid", metavar="FACTORS", parser=factors, help="Grid around the start, in factors of it.")
+]
+Start = Annotated[
+    Any,
+    option("--start", metavar="F,D", parser=start_point, help="Start in the bundle: f_max in N, delta_max in m."),
+]
+Scale = Annotated[float | None, option("--mm-per-px", metavar="S", parser=positive, help="Scale of the images.")]
+ObjectiveChoice = Annotated[
+    Objective | None, option("--objective", help="What is compared; fields where there are any, else load.")
+]
+Record = Annotated[
+    Path | None, option("--from", metavar="FILE", help="Record of the testing machine, cleaned into load_cmod.csv.")
+]
+NoisePx = Annotated[float, option("--noise-px", metavar="S", parser=not_negative, help="Noise of displacements (px).")]
+LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=not_negative, help="Noise of the load (N).")]
+Version = Annotated[bool, option("--version", is_eager=True, callback=show_version, help="Show the version and exit.")]
