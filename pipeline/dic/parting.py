@@ -94,12 +94,12 @@ def _neighbours(match: Match, sheet: Sheet, of: np.ndarray) -> np.ndarray:
 
 
 def _extrapolated(match: Match, sheet: Sheet, to: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """Warps and levels (..., 8) of the points `source`, seen from the points `to` (broadcast together)."""
-    arm = match.grid.points[to] - match.grid.points[source]
+    """Warps, levels and places (..., 10) of the points `source`, seen from the points `to` (broadcast together)."""
+    arm = match.grid.points[source] - match.grid.points[to]
     warp = sheet.warp[source].copy()
-    warp[..., 0] += warp[..., 2] * arm[..., 0] + warp[..., 3] * arm[..., 1]
-    warp[..., 1] += warp[..., 4] * arm[..., 0] + warp[..., 5] * arm[..., 1]
-    return np.concatenate([warp, sheet.level[source]], axis=-1)
+    warp[..., 0] -= warp[..., 2] * arm[..., 0] + warp[..., 3] * arm[..., 1]
+    warp[..., 1] -= warp[..., 4] * arm[..., 0] + warp[..., 5] * arm[..., 1]
+    return np.concatenate([warp, sheet.level[source], arm], axis=-1)
 
 
 def _try_whole(match: Match, sheet: Sheet, noise: MatchNoise, points: np.ndarray, chosen: np.ndarray) -> None:
@@ -139,7 +139,7 @@ def adopt(sheet: Sheet, points: np.ndarray, found: dict[str, np.ndarray], noise:
 def _candidates(match: Match, sheet: Sheet, points: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows of warp and level for all points one after the other, and where each point's rows begin."""
     rows = _extrapolated(match, sheet, points[:, None], np.maximum(chosen, 0))
-    own = np.concatenate([sheet.warp[points], sheet.level[points]], axis=1)
+    own = np.column_stack([sheet.warp[points], sheet.level[points], np.full((len(points), 2), np.nan)])
     near, far = own.copy(), own.copy()
     near[:, :2] -= 0.4 * sheet.suspect[points, 2:]
     far[:, :2] += 0.6 * sheet.suspect[points, 2:]

@@ -209,15 +209,15 @@ NB_MODULE(_correlate, m) {
       "reference"_a, "current"_a, "points"_a, "guesses"_a, "carried"_a.none(), nb::kw_only(), "half"_a, "model"_a,
       "max_iterations"_a, "tolerance"_a, "wander"_a, "accept"_a, "threads"_a);
 
-  // Candidates of all points one after the other, rows of u, v, u_x, u_y, v_x, v_y, gain, offset; those of point i
-  // are the rows first[i] to first[i + 1].
+  // Candidates of all points one after the other, rows of u, v, u_x, u_y, v_x, v_y, gain, offset, ξ, η (where it
+  // was seen, NaN: the point's own); those of point i are the rows first[i] to first[i + 1].
   m.def(
       "split",
       [](const Picture &reference, const Picture &current, Doubles points, Doubles candidates, IntList first,
          double variance, std::optional<Doubles> from, std::optional<Doubles> far, std::optional<Doubles> lines,
          int half, int model, int max_iterations, double tolerance, double wander, int threads) {
         const std::size_t n = points.shape(0);
-        need(first.shape(0) == n + 1 && candidates.shape(1) == 8, "candidates are rows of 8 numbers, points + 1 starts");
+        need(first.shape(0) == n + 1 && candidates.shape(1) == 10, "candidates are rows of 10 numbers, points + 1 starts");
         for (std::size_t i = 0; i < n; ++i)
           need(first(i) >= 0 && first(i) <= first(i + 1) && first(i + 1) <= int(candidates.shape(0)),
                "the starts of the candidates must not decrease");
@@ -235,7 +235,7 @@ NB_MODULE(_correlate, m) {
             std::vector<Candidate> own;
             for (int k = first(i); k < first(i + 1); ++k) {
               const double *c = &candidates(k, 0);
-              own.push_back({{c[0], c[1], c[2], c[3], c[4], c[5]}, c[6], c[7]});
+              own.push_back({{c[0], c[1], c[2], c[3], c[4], c[5]}, c[6], c[7], c[8], c[9]});
             }
             const Line line = lines ? Line{(*lines)(i, 0), (*lines)(i, 1)} : Line{};
             const bool parted = lines && line.offset >= 0;

@@ -12,6 +12,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kLeastFar = 24;     // pixels; smaller parts are not matched
 constexpr int kLeastAffine = 72;  // pixels; smaller far parts keep the gradients they were given
+constexpr double kSurest = 1e-3;  // gradients are never taken for better known than this
 constexpr double kInnermost = 0.5, kOutermost = 4.5;  // px, of the band along the line that may be left out
 
 // Maps of clipped cost, one row a candidate; the last row stands for pixels that nothing matches.
@@ -100,8 +101,30 @@ double band(const std::vector<float> &distance, const float *cost, double expect
   }
   double margin = kInnermost;
   for (int b = 0; b < bins; ++b)
-    if (sum[b] > expected * (number[b] + 2.5 * std::sqrt(2 * number[b] + 1))) margin = b + 1.5;
+    if (sum[b] > expected * (number[b] + 4 * std::sqrt(2 * number[b] + 1))) margin = b + 1.5;
   return std::min(margin, kOutermost);
+}
+
+// The gradients that the neighbours on one side of the line agree on, as far as they agree (empirical Bayes): half a
+// subset knows little of the gradient across the line, and what it does not know it would pass on to the displacement.
+bool agreed(const std::vector<Candidate> &candidates, const Line &line, double sign, double variance, Prior &prior) {
+  double sum[4] = {}, square[4] = {};
+  int n = 0;
+  for (const Candidate &c : candidates) {
+    const double d = c.xi * std::cos(line.angle) + c.eta * std::sin(line.angle) - line.offset;
+    if (!(sign * d < -1)) continue;
+    const double g[4] = {c.warp.ux, c.warp.uy, c.warp.vx, c.warp.vy};
+    for (int k = 0; k < 4; ++k) sum[k] += g[k], square[k] += g[k] * g[k];
+    ++n;
+  }
+  if (n < 3) return false;
+  double scatter = 0;  // one for all four: they are few
+  for (int k = 0; k < 4; ++k) {
+    prior.mean[k] = sum[k] / n;
+    scatter += (square[k] - n * prior.mean[k] * prior.mean[k]) / (4.0 * (n - 1));
+  }
+  prior.weight.fill(variance / std::max(scatter, kSurest * kSurest));
+  return true;
 }
 
 struct Part {
@@ -113,7 +136,7 @@ struct Part {
 
 // Match one side of the line; sign +1 the near one. False where it is too small or finds nothing.
 bool match_side(const Part &part, const Line &line, double sign, double margin, const Candidate &start, Fit &out,
-                int &count) {
+                int &count, const Prior *prior = nullptr) {
   SplitBench &w = part.work;
   distances(w.all, line, sign, w.distance);
   w.all.keep(w.distance, margin, w.part);
@@ -121,7 +144,7 @@ bool match_side(const Part &part, const Line &line, double sign, double margin, 
   if (count < kLeastFar) return false;
   Settings s = part.settings;
   if (count < kLeastAffine) s.model = Model::Translation;
-  out = fit(w.part, part.current, part.centre, start.warp, s, w.bench);
+  out = fit(w.part, part.current, part.centre, start.warp, s, w.bench, prior);
   return out.outcome == Outcome::Converged && out.zncc > 0.3;
 }
 
@@ -158,11 +181,14 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
   const Part part{current, centre, settings.fit, work};
   double near_margin = 1.5, far_margin = 1.5;
   bool far_known = cut.far != none;
+  Prior near_prior, far_prior;
   for (int round = 0; round < settings.rounds; ++round) {
     const Line before = cut.line;
-    if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count)) return r;
+    const Prior *near_known = agreed(candidates, cut.line, 1, variance, near_prior) ? &near_prior : nullptr;
+    const Prior *beyond = agreed(candidates, cut.line, -1, variance, far_prior) ? &far_prior : nullptr;
+    if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known)) return r;
     near = seen(r.near);
-    r.far_matched = far_known && match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count);
+    r.far_matched = far_known && match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond);
     if (r.far_matched) far = seen(r.far);
     fill_cost(work.all, current, centre, near, variance, settings.clip, work.bench, two.row(0));
     if (far_known) fill_cost(work.all, current, centre, far, variance, settings.clip, work.bench, two.row(1));
@@ -177,12 +203,14 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
   r.attempted = true, r.line = cut.line, r.parted = cut.cost;
   if (far_known) r.swapped = best_cut(work.all, two, half, 48, 0.5, 1, 0, work.strips).cost;
   else r.swapped = std::numeric_limits<double>::max();
+  const Prior *near_known = agreed(candidates, cut.line, 1, variance, near_prior) ? &near_prior : nullptr;
+  const Prior *beyond = agreed(candidates, cut.line, -1, variance, far_prior) ? &far_prior : nullptr;
   if (far_known) {
-    r.far_matched = match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count);
+    r.far_matched = match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond);
     if (r.far_matched)
       r.far_score = screen(work.part, work.bench.error.data(), r.far, r.far.residual / (r.far_count - 8), half).score;
   }
-  if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count)) return r.attempted = false, r;
+  if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known)) return r.attempted = false, r;
   r.second = screen(work.part, work.bench.error.data(), r.near, r.near.residual / (r.near_count - 8), half);
   r.near_score = r.second.score;
   return r;

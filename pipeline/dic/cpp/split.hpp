@@ -6,10 +6,11 @@
 
 namespace dic {
 
-// A motion seen near the subset, with the brightness it came with.
+// A motion seen near the subset, with the brightness it came with and where it was seen from the centre; NaN where
+// it is the subset's own.
 struct Candidate {
   Warp warp;
-  double gain = 1, offset = 0;
+  double gain = 1, offset = 0, xi = 0, eta = 0;
 };
 
 struct SplitResult {

@@ -246,12 +246,14 @@ Warp as_rotation(const Warp &w) {
 }  // namespace
 
 Fit fit(const Pixels &pixels, const Picture &current, Point centre, const Warp &guess, const Settings &settings,
-        Bench &bench) {
+        Bench &bench, const Prior *prior) {
   Fit result;
   result.warp = guess;
   const Level f = level(pixels.grey.data(), pixels.mask.data(), pixels.padded, pixels.count);
   Curvature c;
   if (pixels.count > 8 && f.norm > 0) curvature(pixels, f, c);
+  if (prior)
+    for (int k = 0; k < 4; ++k) c.hessian[7 * (k + 2)] += prior->weight[k];
   if (!(pixels.count > 8 && f.norm > 0) || !reduced_inverse(c.hessian, settings.model, result.inverse.data())) {
     result.outcome = Outcome::NoContrast;
     return result;
@@ -275,6 +277,10 @@ Fit fit(const Pixels &pixels, const Picture &current, Point centre, const Warp &
     result.gain = g.norm / f.norm, result.offset = g.mean - result.gain * f.mean;
     if (result.outcome == Outcome::Converged || result.iterations >= settings.max_iterations) return result;
     for (int k = 0; k < 6; ++k) b[k] -= c.along[k] * along;
+    if (prior) {
+      const double now[4] = {result.warp.ux, result.warp.uy, result.warp.vx, result.warp.vy};
+      for (int k = 0; k < 4; ++k) b[k + 2] += prior->weight[k] * (prior->mean[k] - now[k]);
+    }
     for (int k = 0; k < 6; ++k) {
       step[k] = 0;
       for (int l = 0; l < 6; ++l) step[k] += result.inverse[k * 6 + l] * b[l];

@@ -62,6 +62,11 @@ struct Fit {
   double grey = 0, contrast = 0;          // mean f and |f̃|² of the reference
 };
 
+// What is known of the gradients beforehand: mean, and weight = variance of e / variance of the gradient.
+struct Prior {
+  std::array<double, 4> mean{}, weight{};
+};
+
 // Scratch memory of one thread.
 struct Bench {
   std::vector<float> sampled, error, tx, ty;
@@ -74,7 +79,7 @@ bool sample(const Spline &spline, const Pixels &pixels, Point centre, const Warp
 
 // Inverse-compositional Gauss–Newton on ZNSSD (Baker & Matthews 2004; Pan, Li & Tong 2013); leaves e in bench.error.
 Fit fit(const Pixels &pixels, const Picture &current, Point centre, const Warp &guess, const Settings &settings,
-        Bench &bench);
+        Bench &bench, const Prior *prior = nullptr);
 
 // e = reference − (current − offset)/gain at a warp that is not changed; Σ e², or a negative number outside.
 double misfit(const Pixels &pixels, const Picture &current, Point centre, const Warp &warp, double gain, double offset,
