@@ -1,0 +1,1 @@
+"""From the picture of a cut face to particles and bonds: segmentation, packing, phases, grips."""
