@@ -20,7 +20,9 @@ from pipeline.dic.status import Status
 _SECTORS = 12
 _WAVES = 4
 _GAIN = 36.0  # χ² that a cut must save: 1 in 1000 under white noise, for six parameters and the search of the line
-_SIDE = 12.0  # χ² by which the centre's side must be preferred
+_SIDE = 25.0  # χ² by which the centre's side must be preferred
+_CLOSE_PX = 1.0  # nearer to the centre than this a line is not located by its pixels, which the gap has blurred …
+_CLOSE_SIDE = 150.0  # … unless χ² speaks so clearly
 _HARMLESS_PX = 0.05  # a jump so small may be put on the wrong side
 
 
@@ -179,7 +181,9 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     saves = single - parted > _GAIN * noise.score
     fits = found["attempted"].astype(bool) & (variance <= noise.limit(near_n))
     one_piece = (found["near_fit"][:, 4] <= noise.refused) & ~(far & (found["far_fit"][:, 4] > noise.refused))
-    told = ~far | (swapped - parted > _SIDE * noise.score) | (np.linalg.norm(jump, axis=1) < _HARMLESS_PX)
+    preferred = (swapped - parted) / noise.score
+    told = (preferred > _SIDE) & ((found["line"][:, 1] > _CLOSE_PX) | (preferred > _CLOSE_SIDE))
+    told |= far & (np.linalg.norm(jump, axis=1) < _HARMLESS_PX)
     count = 2 * near_n.mean()  # of the whole subset, within the accuracy of its limit
     whole = ~saves & (sheet.variance[points] <= noise.limit(np.full(len(points), count)))
     sheet.status[points] = np.select(

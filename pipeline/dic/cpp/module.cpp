@@ -119,8 +119,8 @@ nb::dict unpack(const std::vector<SplitResult> &results) {
     const SplitResult &r = results[i];
     put(r.near.warp, near + 6 * i), put(r.far.warp, far + 6 * i);
     const double l[2] = {r.line.angle, r.line.offset}, c[3] = {r.single, r.parted, r.swapped};
-    const double a[5] = {r.near.zncc, r.near.residual, r.near.gain, r.near.offset, r.near_score};
-    const double b[5] = {r.far.zncc, r.far.residual, r.far.gain, r.far.offset, r.far_score};
+    const double a[5] = {r.near.zncc, r.near.residual, r.near.gain, r.near.offset, r.near_second.score};
+    const double b[5] = {r.far.zncc, r.far.residual, r.far.gain, r.far.offset, r.far_second.score};
     std::copy_n(l, 2, line + 2 * i), std::copy_n(c, 3, cost + 3 * i);
     std::copy_n(a, 5, near_fit + 5 * i), std::copy_n(b, 5, far_fit + 5 * i);
     std::copy_n(r.near.inverse.data(), 36, near_covariance + 36 * i);

@@ -12,6 +12,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kLeastFar = 24;     // pixels; smaller parts are not matched
 constexpr int kLeastAffine = 72;  // pixels; smaller far parts keep the gradients they were given
+constexpr double kClean = 20;      // χ² of the score test that needs no wider margin
 constexpr double kSurest = 1e-3;  // gradients are never taken for better known than this
 constexpr double kInnermost = 0.5, kOutermost = 4.5;  // px, of the band along the line that may be left out
 
@@ -150,6 +151,18 @@ bool match_side(const Part &part, const Line &line, double sign, double margin, 
 
 Candidate seen(const Fit &f) { return {f.warp, f.gain, f.offset}; }
 
+// As match_side(), but while the score test finds the rim of the gap in the part the margin is widened.
+bool match_clean(const Part &part, const Line &line, double sign, double margin, const Candidate &start, Fit &out,
+                 int &count, const Prior *prior, Suspicion &second) {
+  for (int extra = 0; extra < 3; ++extra) {
+    if (!match_side(part, line, sign, margin + extra, start, out, count, prior)) return false;
+    second = screen(part.work.part, part.work.bench.error.data(), out, out.residual / std::max(count - 8, 1),
+                    part.settings.half);
+    if (second.score < kClean) return true;
+  }
+  return true;
+}
+
 double total(const float *cost, int n) {
   double s = 0;
   for (int i = 0; i < n; ++i) s += cost[i];
@@ -205,14 +218,10 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
   else r.swapped = std::numeric_limits<double>::max();
   const Prior *near_known = agreed(candidates, cut.line, 1, variance, near_prior) ? &near_prior : nullptr;
   const Prior *beyond = agreed(candidates, cut.line, -1, variance, far_prior) ? &far_prior : nullptr;
-  if (far_known) {
-    r.far_matched = match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond);
-    if (r.far_matched)
-      r.far_score = screen(work.part, work.bench.error.data(), r.far, r.far.residual / (r.far_count - 8), half).score;
-  }
-  if (!match_side(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known)) return r.attempted = false, r;
-  r.second = screen(work.part, work.bench.error.data(), r.near, r.near.residual / (r.near_count - 8), half);
-  r.near_score = r.second.score;
+  if (far_known)
+    r.far_matched = match_clean(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond, r.far_second);
+  if (!match_clean(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known, r.near_second))
+    r.attempted = false;
   return r;
 }
 

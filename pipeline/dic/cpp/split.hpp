@@ -22,9 +22,7 @@ struct SplitResult {
   double single = 0;         // cost of the best single warp: Σ min(e²/σ², clip) over the subset
   double parted = 0;         // cost of the two warps on both sides of the line
   double swapped = 0;        // least cost of a line that puts the centre on the other side
-  double near_score = 0;     // χ² for a second line through the near part
-  double far_score = 0;
-  Suspicion second;          // where that line lies
+  Suspicion near_second, far_second;  // is there a second line through either part?
 };
 
 struct SplitSettings {
