@@ -1,0 +1,133 @@
+"""The path of equilibria from rest to the last CMOD, in increments small where the curve bends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.core.errors import ConvergenceError
+from pipeline.equilibrium.model import State, rest, scaled
+from pipeline.equilibrium.step import Stepper
+
+
+@dataclass(frozen=True)
+class Increments:
+    """How far one increment opens the mouth, as a share of the last CMOD.
+
+    Parameters
+    ----------
+    far : float; away from the peak
+    near : float; up to the peak and behind it as long as the load exceeds `near_load` of the peak
+    near_load : float
+    leap : float; largest change of the load in one increment, as a share of the peak
+    """
+
+    far: float = 1 / 80
+    near: float = 1 / 160
+    near_load: float = 0.9
+    leap: float = 0.1
+
+    def opening(self, state: State, peak: float, last: float, stations: np.ndarray) -> float:
+        """How far (m) the next increment should open the mouth; it ends at a station that is near."""
+        wanted = last * (self.near if state.load >= self.near_load * peak else self.far)
+        targets = np.append(stations, last) - state.cmod
+        ahead = targets[targets > 0.3 * wanted]
+        if ahead.size and ahead[0] < 1.5 * wanted:
+            return float(ahead[0])
+        return wanted
+
+
+@dataclass
+class Path:
+    """Follows equilibria under machine control, under CMOD control where the machine would snap back.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    last : float, m; CMOD at which the path ends
+    stations : (k,) array, m; CMOD values at which increments should end
+    increments : Increments
+    """
+
+    stepper: Stepper
+    last: float
+    stations: np.ndarray
+    increments: Increments
+    gauge_controlled: bool = False
+    jumps: int = 0
+    peak: float = field(default=0.0)
+    _stiff: float = field(default=1.0)  # machine displacement a CMOD while elastic
+
+    def start(self) -> tuple[State, State]:
+        """Rest and the state at which the first bond starts to soften, or a first elastic increment."""
+        elastic = self.stepper.elastic()
+        law = self.stepper.model.law
+        strain = np.max(elastic.opening / law.delta_peak, initial=0.0)
+        self._stiff = elastic.machine / elastic.cmod
+        factor = 4 * self.increments.far * self.last / elastic.cmod
+        if strain > 0:
+            factor = min(factor, 1 / strain)
+        return rest(self.stepper.model), scaled(elastic, factor)
+
+    def follow(self, before: State, state: State) -> Iterator[State]:
+        """Equilibria behind `state` until the CMOD reaches the last one."""
+        while state.cmod < self.last * (1 - 1e-9):
+            self.peak = max(self.peak, state.load)
+            wanted = self.increments.opening(state, self.peak, self.last, self.stations)
+            growth = float(np.clip(2 * (state.cmod - before.cmod) / wanted, 1 / 16, 1))
+            before, state = state, self.advance(before, state, growth * wanted)
+            yield state
+
+    def advance(self, before: State, state: State, wanted: float) -> State:
+        """The next equilibrium, at most `wanted` (m) further open, less where the load or the energy would leap."""
+        self._choose_control(before, state)
+        rough = None
+        for halving in range(7):
+            found = self._attempt(before, state, wanted / 2**halving)
+            if found is not None and self._smooth(state, found):
+                return found
+            rough = rough or found
+            self.gauge_controlled = self.gauge_controlled or halving >= 2
+        if rough is None:
+            rough = self._machine(before, state, wanted, np.inf)
+        if rough is None:
+            raise ConvergenceError(
+                f"no equilibrium found beyond CMOD = {state.cmod * 1e3:.4g} mm (load {state.load:.4g} N): "
+                "allow more iterations, smaller increments or a larger tolerance"
+            )
+        self.jumps += 1
+        return rough
+
+    def _smooth(self, state: State, found: State) -> bool:
+        """Whether the load changed little and no energy was set free, as it is when a crack jumps."""
+        work = 0.5 * (state.load + found.load) * (found.machine - state.machine)
+        lost = work - (found.energy - state.energy)
+        little = self.increments.leap * self.peak
+        return abs(found.load - state.load) <= little and abs(lost) <= 0.02 * little * abs(found.cmod - state.cmod)
+
+    def _choose_control(self, before: State, state: State) -> None:
+        """Leave machine control where machine displacement hardly grows with CMOD; go back where it does again."""
+        opened = state.cmod - before.cmod
+        gain = (state.machine - before.machine) / (opened * self._stiff) if opened > 0 else 0.0
+        self.gauge_controlled = gain < (0.1 if self.gauge_controlled else 0.02)
+
+    def _attempt(self, before: State, state: State, wanted: float) -> State | None:
+        if not self.gauge_controlled:
+            return self._machine(before, state, wanted, 3 * wanted)
+        share = wanted / (state.cmod - before.cmod)
+        guess = state.free + share * (state.free - before.free)
+        machine = state.machine + share * (state.machine - before.machine)
+        return self.stepper.by_gauge(state, guess, machine, state.cmod + wanted)
+
+    def _machine(self, before: State, state: State, wanted: float, allowed: float) -> State | None:
+        """A machine step that is expected to open the mouth by `wanted`; None where it opens more than allowed."""
+        share = wanted / (state.cmod - before.cmod)
+        guess = state.free + share * (state.free - before.free)
+        machine = state.machine + share * (state.machine - before.machine)
+        if machine <= state.machine:
+            return None
+        found = self.stepper.by_machine(state, guess, machine)
+        opened = found is not None and 0 < found.cmod - state.cmod <= allowed
+        return found if opened else None

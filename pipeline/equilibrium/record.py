@@ -1,0 +1,77 @@
+"""What is kept of a path: the curve, the fields at the stations, the energies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.problem import EnergyBalance, Problem, Solution
+from pipeline.equilibrium.model import State, WholeModel
+
+
+@dataclass
+class Record:
+    """Collects the equilibria of one path; full fields are made only beside the stations.
+
+    Parameters
+    ----------
+    problem : Problem
+    """
+
+    problem: Problem
+    rows: list[tuple[float, float, float]] = field(default_factory=list)  # machine (m), CMOD (m), load (N)
+    frames: list[np.ndarray] = field(default_factory=list)
+    residual: float = 0.0
+    error: float = 0.0
+    iterations: int = 0
+
+    def add(self, before: State | None, state: State, model: WholeModel) -> None:
+        """Take in the next equilibrium and interpolate the stations between it and the one before."""
+        self.rows.append((state.machine, state.cmod, state.load))
+        self.residual = max(self.residual, state.residual)
+        self.error = max(self.error, state.error)
+        self.iterations += state.iterations
+        if before is not None:
+            self._interpolate(before, state, model)
+
+    def _interpolate(self, before: State, state: State, model: WholeModel) -> None:
+        stations = self.problem.stations
+        while len(self.frames) < stations.size and stations[len(self.frames)] <= state.cmod * (1 + 1e-9):
+            share = (stations[len(self.frames)] - before.cmod) / (state.cmod - before.cmod)
+            ends = [model.displacement(s.free, s.machine) for s in (before, state)]
+            self.frames.append((1 - share) * ends[0] + share * ends[1])
+
+    def curve(self) -> LoadCurve:
+        """Load against CMOD; time counts at the CMOD rate of the test."""
+        machine, cmod, load = np.asarray(self.rows).T
+        time = np.maximum.accumulate(cmod) / self.problem.cmod_rate
+        return LoadCurve(time=time, cmod=cmod, load=load, load_line=machine)
+
+    def energy(self, state: State) -> EnergyBalance:
+        """Work of the machine by trapezoids against what is stored and used up in the last state."""
+        machine, _, load = np.asarray(self.rows).T
+        law = self.problem.law
+        return EnergyBalance(
+            external=float(np.trapezoid(load, machine)),
+            stored=float(law.stored(state.opening, state.reached).sum()),
+            dissipated=float(law.dissipated(state.reached).sum()),
+        )
+
+    def solution(self, state: State, seconds: float, converged: bool, message: str) -> Solution:
+        """Everything together, at the end of the path."""
+        n = self.problem.particles.count
+        return Solution(
+            curve=self.curve(),
+            cmod=self.problem.stations[: len(self.frames)],
+            displacement=np.array(self.frames).reshape(-1, n, 2),
+            reached=state.reached,
+            energy=self.energy(state),
+            quasi_static_error=self.error,
+            steps=len(self.rows) - 1,
+            seconds=seconds,
+            engine="equilibrium",
+            converged=converged,
+            message=message,
+        )

@@ -1,0 +1,105 @@
+"""One increment: from one equilibrium to the next, under machine or under CMOD control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.equilibrium.minimise import Minimum, minimise
+from pipeline.equilibrium.model import Model, State
+from pipeline.equilibrium.potential import Potential, SecantPreconditioner
+
+
+@dataclass
+class Stepper:
+    """Finds equilibria of one model.
+
+    Parameters
+    ----------
+    model : Model
+    tolerance : float, N; largest force out of balance
+    limit : int; iterations after which a minimisation counts as failed
+    """
+
+    model: Model
+    tolerance: float = np.inf
+    limit: int = 400
+
+    def elastic(self) -> State:
+        """The linear elastic state at a machine displacement of 1 m: only a direction and a compliance."""
+        zero = np.zeros(self.model.gauge.size)
+        bonds = np.zeros(self.model.law.k_n.size)
+        network, stiffness = self.model.network, self.model.law.k_n
+        tiny = 1e-9  # a motion so small that true lengths are linear in it
+        pull, _ = network.pull(stiffness * network.opening(zero, tiny), zero, 0.0)
+        preconditioner = self._preconditioner(Potential(network, self.model.law, bonds), 0.0)
+        preconditioner.renew(zero)
+        free = -preconditioner.solve(pull) / tiny
+        opening = network.opening(tiny * free, tiny) / tiny
+        _, load = network.pull(stiffness * opening, zero, 0.0)
+        return State(free, 1.0, load, self._cmod(free, 1.0), opening, np.maximum(opening, 0.0), load / 2)
+
+    def by_machine(self, start: State, guess: np.ndarray, machine: float) -> State | None:
+        """The equilibrium at a machine displacement; None where none was found."""
+        found, potential = self._minimum(start.reached, guess, machine, self.tolerance, None)
+        return self._state(found, potential, machine) if found.converged else None
+
+    def by_gauge(self, start: State, guess: np.ndarray, machine: float, cmod: float) -> State | None:
+        """The equilibrium at a CMOD, the machine displacement adjusted until the gauge carries no force."""
+        gauge = self.model.gauge
+        trials: list[tuple[float, float]] = []
+        reach = max(abs(machine - start.machine), 0.01 * abs(start.machine))
+        for _ in range(15):
+            miss = cmod - self._cmod(guess, machine)
+            guess = guess + gauge * (miss / (gauge @ gauge))
+            found, potential = self._minimum(start.reached, guess, machine, 0.5 * self.tolerance, gauge)
+            if not found.converged:
+                return None
+            if abs(found.multiplier) * np.abs(gauge).max() <= 0.5 * self.tolerance:
+                return self._state(found, potential, machine)
+            trials.append((machine, found.multiplier))
+            machine, guess = _next_trial(trials, reach), found.at
+        return None
+
+    def _minimum(
+        self, reached: np.ndarray, guess: np.ndarray, machine: float, tolerance: float, constraint: np.ndarray | None
+    ) -> tuple[Minimum, Potential]:
+        potential = Potential(self.model.network, self.model.law, reached)
+        preconditioner = self._preconditioner(potential, machine)
+        preconditioner.renew(guess)
+        slope = lambda free: potential.gradient(free, machine)  # noqa: E731
+        return minimise(slope, preconditioner, guess, tolerance, constraint, self.limit), potential
+
+    def _preconditioner(self, potential: Potential, machine: float) -> SecantPreconditioner:
+        return SecantPreconditioner(potential, machine)
+
+    def _state(self, found: Minimum, potential: Potential, machine: float) -> State:
+        gradient, load, opening = potential.state(found.at, machine)
+        size = float(np.linalg.norm(found.at))
+        return State(
+            free=found.at,
+            machine=machine,
+            load=load,
+            cmod=self._cmod(found.at, machine),
+            opening=opening,
+            reached=np.maximum(opening, potential.reached),
+            energy=potential.energy(opening),
+            residual=float(np.abs(gradient).max()),
+            error=float(np.linalg.norm(found.step)) / size if size else 0.0,
+            iterations=found.iterations,
+        )
+
+    def _cmod(self, free: np.ndarray, machine: float) -> float:
+        return float(self.model.gauge @ free) + machine * self.model.gauge_drive
+
+
+def _next_trial(trials: list[tuple[float, float]], reach: float) -> float:
+    """Machine displacement at which the gauge force (N) would vanish: more travel relieves a pulling gauge."""
+    machine, force = trials[-1]
+    if len(trials) == 1:
+        return machine + 0.2 * reach * float(np.sign(force))
+    before, force_before = trials[-2]
+    slope = (force - force_before) / (machine - before)
+    step = -force / slope if slope < 0 else float(np.sign(force)) * reach
+    return machine + float(np.clip(step, -2 * reach, 2 * reach))

@@ -1,0 +1,1 @@
+"""Material laws: elastic constants, cohesive laws, viscoelasticity."""
