@@ -1,0 +1,130 @@
+"""Settings of a run: how the bundle's question is answered, not what was measured.
+
+A TOML file of these keys (unknown ones refused, units in their names) may be given to a command; options on
+the command line win over it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from pipeline.core.errors import InputError, MissingFileError
+from pipeline.core.units import MM
+
+
+def _increasing(factors: tuple[float, ...]) -> tuple[float, ...]:
+    if any(b <= a for a, b in pairwise(factors)):
+        raise ValueError("must increase from entry to entry")
+    return factors
+
+
+Factor = Annotated[float, Field(gt=0, le=10)]
+Factors = Annotated[tuple[Factor, ...], Field(strict=False, min_length=3, max_length=15), AfterValidator(_increasing)]
+
+
+class RunSettings(BaseModel):
+    """Frozen, validated settings of one run; every key has a default.
+
+    Raises (through `run_settings` and `load_settings`) InputError with every problem at once.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    engine: Literal["lammps", "equilibrium", "reference"] = Field(default="lammps", description="what solves the tests")
+    accuracy: Annotated[float, Field(gt=0, le=0.2)] = Field(
+        default=0.01, description="quasi-static error asked for, relative, in load and displacement"
+    )
+    workers: Annotated[int, Field(ge=1, le=4096)] | None = Field(
+        default=None, description="simulations at a time; absent: as many as there are processors"
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(default=0, description="of everything random")
+    radius_mm: Annotated[float, Field(ge=1e-3, le=20)] | None = Field(
+        default=None, description="particle radius instead of the bundle's; f_max/(2 r t) is kept"
+    )
+    objective: Literal["fields", "load", "both"] | None = Field(
+        default=None, description="absent: fields where the bundle has some, else load"
+    )
+    rigid: Literal["fit", "keep"] = Field(
+        default="fit", description="fit: rigid motion is taken out of the difference of the fields; keep: the paper"
+    )
+    grid: Factors = Field(default=(0.8, 0.9, 1.0, 1.1, 1.2), description="of f_max and delta_max, times their start")
+    grid_f_max: Factors | None = Field(default=None, description="of f_max alone, instead of grid")
+    grid_delta_max: Factors | None = Field(default=None, description="of delta_max alone, instead of grid")
+    recentring_count: Annotated[int, Field(ge=0, le=10)] = Field(
+        default=3, description="how often the grid may be moved when the optimum lies on its edge"
+    )
+    recentring_steps: Annotated[int, Field(ge=1, le=10)] = Field(default=2, description="grid lines by which it moves")
+    modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        default=0.05,
+        description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",
+    )
+    viscoelastic: bool = Field(default=False, description="Burgers bonds from creep.csv")
+    levelling: bool = Field(default=False, description="simulated fields go through the same image correlation")
+
+    @property
+    def radius(self) -> float | None:
+        """m, None: the bundle's own"""
+        return None if self.radius_mm is None else self.radius_mm * MM
+
+    @property
+    def f_factors(self) -> tuple[float, ...]:
+        """Grid lines of f_max over its start."""
+        return self.grid_f_max or self.grid
+
+    @property
+    def delta_factors(self) -> tuple[float, ...]:
+        """Grid lines of delta_max over its start."""
+        return self.grid_delta_max or self.grid
+
+
+def run_settings(options: Mapping[str, Any], file: str = "options") -> RunSettings:
+    """Settings from a mapping; None stands for the default. Refuses with every problem at once."""
+    try:
+        return RunSettings.model_validate({key: value for key, value in options.items() if value is not None})
+    except ValidationError as error:
+        raise InputError("\n".join(f"{file}: {_sentence(problem)}" for problem in error.errors())) from None
+
+
+def load_settings(path: Path, options: Mapping[str, Any] | None = None) -> RunSettings:
+    """Settings from a TOML file; `options` that are not None win over it.
+
+    Raises
+    ------
+    MissingFileError, InputError
+        where the file is missing, not TOML, or has a key or value that is refused
+    """
+    try:
+        raw = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path} does not exist: give the TOML file with the settings of the run") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path.name} cannot be read as TOML: {error}") from None
+    given = {key: value for key, value in (options or {}).items() if value is not None}
+    return run_settings(raw | given, path.name)
+
+
+def _sentence(problem: ErrorDetails) -> str:
+    """One problem in words: key, value, rule."""
+    key, kind = str(problem["loc"][0]), problem["type"]
+    if kind == "extra_forbidden":
+        meant = difflib.get_close_matches(key, list(RunSettings.model_fields), n=1)
+        return f"{key} is not a setting: " + (f"did you mean {meant[0]}?" if meant else "remove it")
+    rule = str(problem["ctx"]["error"]) if kind == "value_error" else problem["msg"].replace("Input should", "should")
+    return f"{key} = {problem['input']!r}: {rule}"
+
+
+def settings_table() -> str:
+    """Every setting with its default and meaning, as a Markdown table for the documentation."""
+    rows = [
+        f"| `{key}` | {'' if field.default is None else repr(field.default)} | {field.description} |"
+        for key, field in RunSettings.model_fields.items()
+    ]
+    return "\n".join(["| key | default | meaning |", "|---|---|---|", *rows]) + "\n"

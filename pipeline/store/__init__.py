@@ -1,0 +1,1 @@
+"""The door: experiment bundles, images, displacement fields, simulations and results on disk."""
