@@ -130,7 +130,7 @@ def _refuse_outside(share: float, largest: float) -> None:
     if share > largest:
         raise InputError(
             f"{share:.0%} of the specimen lies outside its image (beyond the edge, or labelled 0), at most "
-            f"{largest:.0%} may: check mm_per_px, origin_px and rotation_deg of [specimen.image], or bring an image of all of it"
+            f"{largest:.0%} may: check mm_per_px, origin_px and rotation_deg of [specimen.image], or a whole image"
         )
 
 
