@@ -84,12 +84,12 @@ class Path:
         """The next equilibrium, at most `wanted` (m) further open, less where the load or the energy would leap."""
         self._choose_control(before, state)
         rough = None
-        for halving in range(7):
+        for halving in range(5):
             found = self._attempt(before, state, wanted / 2**halving)
             if found is not None and self._smooth(state, found):
                 return found
             rough = rough or found
-            self.gauge_controlled = self.gauge_controlled or halving >= 2
+            self.gauge_controlled = self.gauge_controlled or halving >= 1
         if rough is None:
             rough = self._machine(before, state, wanted, np.inf)
         if rough is None:

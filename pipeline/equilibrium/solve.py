@@ -43,7 +43,7 @@ def solve(
     Raises
     ------
     ConvergenceError
-        if no equilibrium is found before the last CMOD, unless `strict` is False
+        if no equilibrium is found before the last CMOD, unless `strict` is False and a part of the curve exists
     """
     started = time.process_time()
     _refuse(problem, tolerance)
@@ -63,7 +63,7 @@ def solve(
             if progress is not None:
                 progress(min(state.cmod / problem.cmod_max, 1.0))
     except ConvergenceError as stopped:
-        if strict:
+        if strict or len(record.rows) < 3:  # two rows are no curve
             raise
         failure = str(stopped)
     message = failure or _message(path, state.cmod)
