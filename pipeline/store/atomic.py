@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import threading
@@ -40,7 +41,8 @@ def write_atomically(path: Path, content: bytes) -> None:
     except OSError as error:
         raise refused(path, error) from error
     finally:
-        part.unlink(missing_ok=True) if part.parent.is_dir() else None
+        with contextlib.suppress(OSError):  # no such folder, or read-only: then it was never made
+            part.unlink(missing_ok=True)
 
 
 def refused(path: Path, error: OSError) -> StoreError:

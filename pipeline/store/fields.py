@@ -78,13 +78,16 @@ def _value_problems(file: h5py.File) -> list[str]:
     """What is wrong with points, times and standard deviations."""
     time, points = file["time_s"][()], file["points"][()]
     std = file["std_mm"][()] if "std_mm" in file else np.zeros(())
-    back = np.diff(time) <= 0
+    back = np.flatnonzero(np.diff(time) <= 0)
     empty = not (time.size and points.size)
     rules = (
         (empty, "holds no frame or no point: nothing can be compared"),
         (not np.isfinite(points).all(), "points holds NaN: every point needs a position; mark bad ones in valid"),
         (not np.isfinite(time).all(), "time_s holds NaN: every frame needs a time"),
-        (bool(back.any()), f"time_s does not increase at frame {int(np.argmax(back)) + 1}: sort the frames by time"),
+        (
+            back.size > 0,
+            f"time_s does not increase at frame {int(back[0]) + 1 if back.size else 0}: sort the frames by time",
+        ),
         (bool(np.any(std < 0)), "std_mm is negative: a standard deviation is zero or larger"),
     )
     return [sentence for bad, sentence in rules if bad]

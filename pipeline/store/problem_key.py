@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def problem_key(problem: Problem, engine: str) -> str:
         where the problem holds an object whose content is unknown
     """
     digest = hashlib.sha256(VERSION.encode())
-    for piece in _pieces((engine, problem), "problem"):
+    for piece in chain(_pieces(engine, "engine"), _pieces(problem, "problem")):
         digest.update(piece)
     return digest.hexdigest()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -35,15 +36,9 @@ def prepare_output(folder: Path) -> Path:
     except OSError as error:
         raise refused(folder, error) from error
     finally:
-        _forget(probe)
+        with contextlib.suppress(OSError):  # it was never made
+            probe.unlink(missing_ok=True)
     return folder
-
-
-def _forget(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return  # it was never made
 
 
 def write_result(folder: Path, result: Mapping[str, Any]) -> Path:

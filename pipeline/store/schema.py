@@ -68,7 +68,7 @@ class Layout:
             for entry in self.entries:
                 if entry.name in given:
                     _put(file, entry, given[entry.name])
-            self._require(file, self.title)
+            _refuse(self.title, self.problems(file))
             file.flush()
             return bytes(file.id.get_file_image())
 
@@ -84,10 +84,12 @@ class Layout:
         """
         with opened(path) as file:
             try:
-                self._require(file, path.name)
-                return {entry.name: _get(file, entry) for entry in self.entries}
+                problems = self.problems(file)
+                values = {} if problems else {entry.name: _get(file, entry) for entry in self.entries}
             except (OSError, RuntimeError, ValueError, KeyError) as error:
                 raise _damaged(path, error) from error
+        _refuse(path.name, problems)
+        return values
 
     def problems(self, file: h5py.File) -> list[str]:
         """One sentence for each thing in which an open file does not follow the layout."""
@@ -101,15 +103,15 @@ class Layout:
                 found += _misfit(entry, file[entry.name], sizes)
         return found
 
-    def _require(self, file: h5py.File, name: str) -> None:
-        problems = self.problems(file)
-        if problems:
-            raise StoreError("\n".join(f"{name}: {problem}" for problem in problems))
-
     def table(self) -> str:
         """The layout as a Markdown table, for the documentation."""
         rows = [f"| `{e.name}` | {_kind(e)} | {e.unit} | {e.meaning} |" for e in self.entries]
         return "\n".join(["| name | type and shape | unit | meaning |", "|---|---|---|---|", *rows]) + "\n"
+
+
+def _refuse(name: str, problems: list[str]) -> None:
+    if problems:
+        raise StoreError("\n".join(f"{name}: {problem}" for problem in problems))
 
 
 def opened(path: Path) -> h5py.File:
