@@ -15,11 +15,11 @@ from pipeline.core.errors import UnavailableError
 from pipeline.options import (
     Accuracy,
     Bundle,
+    CmodRate,
     Config,
     Debug,
     DeltaMax,
     Effect,
-    Engine,
     EngineChoice,
     Fields,
     FMax,
@@ -77,13 +77,14 @@ def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make.")],
     geometry: Annotated[Geometry, option("--geometry", help="Specimen.")],
     record: Record = None,
+    cmod_rate_mm_per_min: CmodRate = None,
     debug: Debug = False,
 ) -> None:
     """Make an experiment bundle to fill in."""
     with exit_codes(debug):
         from pipeline.study.new import new as make
 
-        finish(make(folder, geometry=geometry, record=record), folder)
+        finish(make(folder, geometry, record, cmod_rate_mm_per_min), folder)
 
 
 @app.command()
@@ -102,7 +103,7 @@ def model(
     radius_mm: Radius = None,
     config: Config = None,
     workers: Workers = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     debug: Debug = False,
 ) -> None:
     """Build the bonded-particle model of a specimen, and draw it."""
@@ -119,14 +120,14 @@ def simulate(
     out: Out,
     f_max: FMax,
     delta_max: DeltaMax,
-    engine: EngineChoice = Engine.LAMMPS,
+    engine: EngineChoice = None,
     radius_mm: Radius = None,
-    accuracy: Accuracy = 0.01,
+    accuracy: Accuracy = None,
     law: Annotated[str | None, option("--law", metavar="NAME", help="Softening instead of the bundle's.")] = None,
     effect: Effect = None,
     config: Config = None,
     workers: Workers = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     debug: Debug = False,
 ) -> None:
     """Simulate one fracture test."""
@@ -152,17 +153,17 @@ def simulate(
 def identify(
     bundle: Bundle,
     out: Out,
-    engine: EngineChoice = Engine.LAMMPS,
-    grid: Grid = "0.8,0.9,1,1.1,1.2",
+    engine: EngineChoice = None,
+    grid: Grid = None,
     objective: ObjectiveChoice = None,
     radius_mm: Radius = None,
-    accuracy: Accuracy = 0.01,
+    accuracy: Accuracy = None,
     fields: Fields = None,
     viscoelastic: Annotated[bool, option("--viscoelastic", help="Let the mastic creep.")] = False,
     levelling: Annotated[bool, option("--levelling", help="Level the estimate for the grid's resolution.")] = False,
     config: Config = None,
     workers: Workers = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     debug: Debug = False,
 ) -> None:
     """Estimate f_max and delta_max of the mastic from a test."""
@@ -205,7 +206,7 @@ def virtual_test(
     load_noise_n: LoadNoise = 0.0,
     config: Config = None,
     workers: Workers = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     debug: Debug = False,
 ) -> None:
     """Make a bundle with known truth by another kind of model."""

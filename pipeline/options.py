@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import math
-from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
 from pipeline import __version__
 
-
-class Geometry(StrEnum):
-    """Specimen geometries."""
-
-    SEB = "seb"
-    DCT = "dct"
-
-
-class Engine(StrEnum):
-    """Engines that simulate."""
-
-    LAMMPS = "lammps"
-    EQUILIBRIUM = "equilibrium"
-    REFERENCE = "reference"
-
-
-class Objective(StrEnum):
-    """What `identify` compares."""
-
-    FIELDS = "fields"
-    LOAD = "load"
-    BOTH = "both"
+Geometry = Literal["seb", "dct"]
+Engine = Literal["lammps", "equilibrium", "reference"]
+Objective = Literal["fields", "load", "both"]
 
 
 def positive(text: str) -> float:
@@ -66,8 +46,8 @@ def number(text: str) -> float:
 def factors(text: str) -> tuple[float, ...]:
     """Numbers above zero, separated by commas, each larger than the one before."""
     values = tuple(positive(part) for part in text.split(","))
-    if len(values) < 2 or any(b <= a for a, b in pairwise(values)):
-        raise typer.BadParameter(f"{text!r} must be two or more increasing factors, as in 0.8,0.9,1,1.1,1.2")
+    if len(values) < 3 or any(b <= a for a, b in pairwise(values)):
+        raise typer.BadParameter(f"{text!r} must be three or more increasing factors, as in 0.8,0.9,1,1.1,1.2")
     return values
 
 
@@ -105,16 +85,18 @@ Radius = Annotated[
     float | None,
     option("--radius-mm", metavar="R", parser=positive, help="Particle radius instead of the bundle's; f_max follows."),
 ]
-EngineChoice = Annotated[Engine, option("--engine", help="What simulates.")]
+# what is left out here has the value of --config, or else the default of the settings
+EngineChoice = Annotated[Engine | None, option("--engine", help="What simulates (default: lammps).")]
 Accuracy = Annotated[
-    float, option("--accuracy", metavar="E", parser=positive, help="Quasi-static error asked for, relative.")
+    float | None,
+    option("--accuracy", metavar="E", parser=positive, help="Quasi-static error asked for, relative (default: 0.01)."),
 ]
 Fields = Annotated[Path | None, option("--fields", metavar="FILE", help="Displacement fields instead of the bundle's.")]
 Config = Annotated[Path | None, option("--config", metavar="FILE", help="Settings of the run (TOML).")]
 Workers = Annotated[
-    int | None, option("--workers", metavar="N", min=1, help="Processes at a time; as many as processors if left out.")
+    int | None, option("--workers", metavar="N", min=1, help="Processes at a time; as many as processors.")
 ]
-Seed = Annotated[int, option("--seed", metavar="N", min=0, help="Seed of everything random.")]
+Seed = Annotated[int | None, option("--seed", metavar="N", min=0, help="Seed of everything random (default: 0).")]
 Effect = Annotated[
     list[Any] | None,
     option("--effect", metavar="NAME=VALUE", parser=named_number, help="Something the model leaves out; repeatable."),
@@ -127,7 +109,10 @@ TrueDeltaMax = Annotated[
     float | None, option("--delta-max", metavar="M", parser=positive, help="True delta_max, in m.")
 ]
 Grid = Annotated[
-    Any, option("--grid", metavar="FACTORS", parser=factors, help="Grid around the start, in factors of it.")
+    Any,
+    option(
+        "--grid", metavar="FACTORS", parser=factors, help="Grid, in factors of the start (default: 0.8,0.9,1,1.1,1.2)."
+    ),
 ]
 Start = Annotated[
     Any,
@@ -139,6 +124,10 @@ ObjectiveChoice = Annotated[
 ]
 Record = Annotated[
     Path | None, option("--from", metavar="FILE", help="Record of the testing machine, cleaned into load_cmod.csv.")
+]
+CmodRate = Annotated[
+    float | None,
+    option("--cmod-rate-mm-per-min", metavar="V", parser=positive, help="Gives a record without times its times."),
 ]
 NoisePx = Annotated[float, option("--noise-px", metavar="S", parser=not_negative, help="Noise of displacements (px).")]
 LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=not_negative, help="Noise of the load (N).")]

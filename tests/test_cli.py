@@ -120,7 +120,7 @@ def test_an_interrupt_says_how_to_go_on(study):
         ["identify", "B"],  # -o is missing
         ["identify", "B", "-o", "O", "--grid", "0.9,x"],
         ["identify", "B", "-o", "O", "--grid", "1.1,0.9"],
-        ["identify", "B", "-o", "O", "--grid", "1"],
+        ["identify", "B", "-o", "O", "--grid", "0.9,1.1"],
         ["identify", "B", "-o", "O", "--engine", "abaqus"],
         ["identify", "B", "-o", "O", "--workers", "0"],
         ["identify", "B", "-o", "O", "--objective", "energy"],
@@ -190,12 +190,9 @@ def test_options_reach_the_study(study):
     }
 
 
-def test_what_is_left_out_has_the_values_of_the_handbook(study):
+def test_what_is_left_out_is_left_to_the_settings(study):
     assert run(*COMMANDS["identify"]).exit_code == 0
-    assert study.options["engine"] == "lammps"
-    assert study.options["grid"] == (0.8, 0.9, 1.0, 1.1, 1.2)
-    assert study.options["objective"] is None
-    assert (study.options["accuracy"], study.options["seed"], study.options["workers"]) == (0.01, 0, None)
+    assert {value for name, value in study.options.items() if name != "progress"} == {None}
 
 
 def test_a_virtual_test_is_told_its_truth(study):
@@ -207,8 +204,8 @@ def test_a_virtual_test_is_told_its_truth(study):
 
 
 def test_new_and_from(study):
-    assert run("new", "B", "--geometry", "dct", "--from", "machine.csv").exit_code == 0
-    assert study.options == {"geometry": "dct", "record": Path("machine.csv")}
+    assert run("new", "B", "--geometry", "dct", "--from", "m.csv", "--cmod-rate-mm-per-min", "0.5").exit_code == 0
+    assert study.args == (Path("B"), "dct", Path("m.csv"), 0.5)
 
 
 def test_help_names_every_command_and_loads_nothing_heavy():
@@ -267,3 +264,45 @@ def test_progress_on_a_terminal_shows_the_remaining_time(monkeypatch):
     assert "4/4" in shown
     assert "about 0 s left" in shown
     assert "c failed: [no] equilibrium" in shown
+
+
+def test_a_new_bundle_is_in_order(tmp_path):
+    bundle = tmp_path / "seb-07"
+    made = run("new", str(bundle), "--geometry", "seb")
+    assert made.exit_code == 0, made.stderr
+    checked = run("check", str(bundle))
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    assert checked.stdout.endswith(f"result: {bundle}\n")
+
+
+def test_every_problem_of_a_bundle_is_listed_at_once(tmp_path):
+    bundle = tmp_path / "seb-07"
+    run("new", str(bundle), "--geometry", "seb")
+    text = (bundle / "experiment.toml").read_text(encoding="utf-8")
+    text = text.replace("thickness_mm = 40.0", "thickness_mm = -40.0").replace("poissons_ratio", "poisson_ratio")
+    (bundle / "experiment.toml").write_text(text, encoding="utf-8")
+    result = run("check", str(bundle))
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "thickness_mm" in result.stderr
+    assert "poisson_ratio" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_what_cannot_be_written_is_one_message(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    result = run("new", str(tmp_path / "file" / "bundle"), "--geometry", "seb")
+    assert result.exit_code == 1
+    assert len(result.stderr.splitlines()) == 1
+    assert str(tmp_path / "file") in result.stderr
+
+
+def test_a_file_that_may_not_grow_is_one_message_and_leaves_nothing_half_written(tmp_path):
+    line = 'ulimit -f 1; exec "$0" -m pipeline new bundle --geometry seb'  # blocks of 512 B: less than experiment.toml
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    result = subprocess.run(
+        ["sh", "-c", line, sys.executable], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    assert len(result.stderr.splitlines()) == 1
+    assert "experiment.toml" in result.stderr
+    assert not (tmp_path / "bundle" / "experiment.toml").exists()

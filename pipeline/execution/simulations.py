@@ -22,7 +22,13 @@ class SolutionStore(Protocol):
 
 
 class SimulationError(PipelineError, RuntimeError):
-    """One or more of many simulations failed; the others were finished and kept."""
+    """One or more of many simulations failed; the others were finished and kept.
+
+    Parameters
+    ----------
+    failures : key or name of a simulation → its error
+    total : int; how many were wanted
+    """
 
     def __init__(self, failures: Mapping[str, BaseException], total: int):
         super().__init__(failures, total)
@@ -45,6 +51,7 @@ def run_all(
     executor: Executor | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> None:
     """Simulate every problem whose key the store does not hold, and put each solution there as soon as it is finished.
 
@@ -56,6 +63,7 @@ def run_all(
     executor : any executor of concurrent.futures, left open; None: LocalProcesses(workers)
     workers : int or None; number of local processes, None: as many as there are processors
     progress : Progress or None
+    names : key → what progress and errors call it; None: the key
 
     Raises
     ------
@@ -70,7 +78,7 @@ def run_all(
     if not wanted:
         return
     own = LocalProcesses(workers)
-    batch = _Batch(simulate, wanted, store, own if executor is None else executor, progress)
+    batch = _Batch(simulate, wanted, store, own if executor is None else executor, progress, names or {})
     try:
         failures = batch.run()
     except KeyboardInterrupt:
@@ -96,15 +104,16 @@ class _Batch:
         store: SolutionStore,
         executor: Executor,
         progress: Progress,
+        names: Mapping[str, str],
     ) -> None:
         self.simulate, self.problems, self.store = simulate, problems, store
-        self.executor, self.progress = executor, progress
+        self.executor, self.progress, self.names = executor, progress, names
         self.keys: dict[Future[Solution], str] = {}
         self.retried: set[str] = set()
         self.failures: dict[str, BaseException] = {}
 
     def run(self) -> dict[str, BaseException]:
-        """Run everything; key → error of what failed."""
+        """Run everything; name → error of what failed."""
         for key in self.problems:
             self._submit(key)
         while self.keys:
@@ -134,14 +143,17 @@ class _Batch:
         error = future.exception()
         if error is None:
             self.store.put(key, future.result())
-            self.progress.done(key)
+            self.progress.done(self._name(key))
         elif isinstance(error, WorkerLostError | BrokenExecutor) and key not in self.retried:
             self.retried.add(key)
-            self.progress.lost(key, error)
+            self.progress.lost(self._name(key), error)
             self._submit(key)
         else:
             self._fail(key, error)
 
     def _fail(self, key: str, error: BaseException) -> None:
-        self.failures[key] = error
-        self.progress.failed(key, error)
+        self.failures[self._name(key)] = error
+        self.progress.failed(self._name(key), error)
+
+    def _name(self, key: str) -> str:
+        return self.names.get(key, key)

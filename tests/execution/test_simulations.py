@@ -123,6 +123,13 @@ def test_a_simulation_that_fails_is_named_and_the_others_finish(tmp_path):
     assert isinstance(caught.value.__cause__, ConvergenceError)
 
 
+def test_names_stand_for_keys_in_what_is_told(tmp_path):
+    diary, names = Diary(), {"key0": "f_max = 64 N", "key1": "f_max = 71 N"}
+    with pytest.raises(SimulationError, match="f_max = 64 N: task 0 did not converge"):
+        run_all(simulate, tasks(tmp_path, 2, key0="raise"), FolderStore(tmp_path), progress=diary, names=names)
+    assert {entry[:2] for entry in diary.entries[1:]} == {("failed", "f_max = 64 N"), ("done", "f_max = 71 N")}
+
+
 def test_one_reason_for_many_failures_is_said_once():
     error = SimulationError({"a": ValueError("no disk"), "b": ValueError("no disk"), "c": KeyError()}, 5)
     assert str(error).splitlines() == [
