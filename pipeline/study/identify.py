@@ -1,0 +1,253 @@
+"""The paper's inverse estimation: from a bundle to (f_max, delta_max)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import __version__
+from pipeline.config import RunSettings
+from pipeline.core.errors import InputError, UnavailableError
+from pipeline.core.problem import Problem, Solution
+from pipeline.core.specimen import ligament_area
+from pipeline.core.units import MM
+from pipeline.execution.progress import Progress, Silent
+from pipeline.execution.simulations import run_all
+from pipeline.inverse.design import Design
+from pipeline.inverse.estimate import Estimate, Settings, estimate
+from pipeline.inverse.objective import Objective, Rigid
+from pipeline.inverse.observations import Measured, Simulated
+from pipeline.store.bundle import Bundle, read_bundle
+from pipeline.store.layouts import IDENTIFY
+from pipeline.store.problem_key import problem_key
+from pipeline.store.results import prepare_output, write_arrays, write_result
+from pipeline.store.simulation import SimulationStore
+from pipeline.store.start import start_parameters
+from pipeline.study.engines import Engine
+from pipeline.study.engines import engine as engine_of
+from pipeline.study.model import Model, build_model, settings_of
+from pipeline.study.observation import at_stations, measured_test
+from pipeline.study.pages import identification_page
+from pipeline.study.simulate import curve_result
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Everything that stays the same while the grid moves.
+
+    Parameters
+    ----------
+    model : Model
+    measured : Measured
+    points : (p, 2) array, m; where fields are compared, empty without fields
+    settings : RunSettings
+    engine : Engine
+    store : SimulationStore
+    progress : Progress
+    """
+
+    model: Model
+    measured: Measured
+    points: np.ndarray
+    settings: RunSettings
+    engine: Engine
+    store: SimulationStore
+    progress: Progress
+
+    def problem(self, f_max: float, delta_max: float) -> Problem:
+        """The test at one node of the grid."""
+        return self.model.problem(f_max, delta_max, accuracy=self.settings.accuracy)
+
+    def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
+        """Simulate the nodes that the store does not hold; all of them, in order."""
+        problems = [self.problem(*node) for node in nodes]
+        keys = [problem_key(problem, self.engine.label) for problem in problems]
+        wanted = dict(zip(keys, problems, strict=True))
+        run_all(self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress)
+        found = [self.store.get(key) for key in keys]
+        return [(p, s) for p, s in zip(problems, found, strict=True) if s is not None]
+
+
+def identify(
+    bundle: Path,
+    out: Path,
+    *,
+    engine: str | None = None,
+    grid: tuple[float, ...] | None = None,
+    objective: str | None = None,
+    radius_mm: float | None = None,
+    accuracy: float | None = None,
+    fields: Path | None = None,
+    config: Path | None = None,
+    workers: int | None = None,
+    seed: int | None = None,
+    progress: Progress | None = None,
+) -> str:
+    """Estimate f_max and delta_max of the mastic; writes result.json, results.h5, figures, report.
+
+    Finished simulations are kept in OUT/simulations: the same call goes on where it stopped.
+
+    Parameters
+    ----------
+    bundle, out : folders
+    fields : a field file instead of the bundle's own
+    the others : override the settings of `config`
+    """
+    started = time.monotonic()
+    options = {"engine": engine, "grid": grid, "objective": objective, "radius_mm": radius_mm}
+    options |= {"accuracy": accuracy, "workers": workers, "seed": seed}
+    settings = settings_of(config, **options)
+    chosen = engine_of(settings.engine)
+    read = read_bundle(bundle, fields)
+    aim = choose_objective(read, settings.objective)
+    folder = prepare_output(out)
+    model = build_model(read, settings.radius)
+    field = read.need_fields() if aim is not Objective.LOAD else None
+    measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
+    points = np.zeros((0, 2)) if measured.field is None else measured.field.points
+    store = SimulationStore(folder / "simulations")
+    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent())
+    found = search(campaign, aim)
+    [(problem, optimum)] = run_optimum(campaign, found)
+    result = identification_result(campaign, found, problem, optimum, time.monotonic() - started)
+    write_result(folder, result)
+    write_arrays(folder, IDENTIFY, identification_arrays(campaign, found, optimum))
+    identification_page(folder, model, measured, found, problem, optimum, result)
+    return _summary(found)
+
+
+def choose_objective(bundle: Bundle, wanted: str | None) -> Objective:
+    """What to compare: as asked, else fields where there are some, else the load."""
+    if bundle.images and bundle.fields is None and wanted != "load":
+        raise UnavailableError(
+            f"{bundle.name} has speckle images but no fields.h5: image correlation is not in this version; "
+            "give --fields FILE, or --objective load"
+        )
+    if wanted is not None:
+        return Objective(wanted)
+    return Objective.LOAD if bundle.fields is None else Objective.FIELDS
+
+
+def search(campaign: Campaign, aim: Objective) -> Estimate:
+    """Estimate on the grid; where the optimum lies on its edge, move the grid and estimate again."""
+    settings = campaign.settings
+    centre = start_parameters(campaign.model.bundle)
+    design = Design(centre, settings.f_factors, settings.delta_factors)
+    campaign.progress.stage(f"{np.prod(design.shape)} simulations")
+    found = estimate_on(campaign, design, aim)
+    for move in range(settings.recentring_count):
+        moved = design.recentred(found.f_max, found.delta_max, settings.recentring_steps)
+        if moved == design:
+            break
+        design = moved
+        campaign.progress.stage(f"grid moved, {move + 1} of at most {settings.recentring_count}")
+        found = estimate_on(campaign, design, aim)
+    return found
+
+
+def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
+    """Simulate a grid and estimate on it."""
+    runs = campaign.solutions(design.nodes())
+    stations = campaign.measured.cmod
+    loads = [solution.curve.load_at(stations) for _, solution in runs]
+    seen = None
+    if aim is not Objective.LOAD:
+        seen = [at_stations(problem, solution, campaign.points, stations) for problem, solution in runs]
+    simulated = Simulated.of(design, seen, loads)
+    how = Settings(aim, campaign.settings.modulus_std, Rigid(campaign.settings.rigid))
+    return estimate(design, simulated, campaign.measured, how)
+
+
+def run_optimum(campaign: Campaign, found: Estimate) -> list[tuple[Problem, Solution]]:
+    """Simulate the test at the estimate itself."""
+    campaign.progress.stage("the optimum")
+    runs = campaign.solutions([(found.f_max, found.delta_max)])
+    if not runs:
+        raise InputError("the optimum could not be simulated")
+    return runs
+
+
+def identification_result(
+    campaign: Campaign, found: Estimate, problem: Problem, optimum: Solution, seconds: float
+) -> dict[str, Any]:
+    """The estimate by the keys of result.json; f_max per bond of the bundle's lattice."""
+    cmod, load = optimum.curve.peak()
+    measured_cmod, measured_load = campaign.model.bundle.need_curve().peak()
+    doubt = found.uncertainty
+    area = 2 * campaign.model.bundle.model.radius * problem.specimen.thickness
+    return {
+        "version": __version__,
+        "command": "identify",
+        "seconds": seconds,
+        "engine": campaign.settings.engine,
+        "radius_mm": problem.particles.radius / MM,
+        "f_max_n": found.f_max,
+        "delta_max_m": found.delta_max,
+        "bond_fracture_energy_j_per_m2": 2 * found.bond_energy / area,
+        "interval_95": doubt and {"f_max_n": doubt.f_max, "delta_max_m": doubt.delta_max},
+        "interval_95_bond_fracture_energy_j_per_m2": doubt and [2 * e / area for e in doubt.bond_energy],
+        "interval_contains": doubt and doubt.contains,
+        "interval_lacks": doubt and doubt.lacks,
+        "interval_noise_only": doubt and doubt.noise_only,
+        "correlation": doubt and doubt.correlation,
+        "objective": found.settings.objective,
+        "objective_min": found.minimum.value,
+        "interior": found.interior,
+        "accepted": found.accepted,
+        "status": found.status,
+        "converged": found.minimum.converged and found.accepted,
+        "warnings": list(found.warnings),
+        "remarks": list(campaign.model.remarks),
+        "grid": {
+            "f_max_n": found.design.f_max,
+            "delta_max_m": found.design.delta_max,
+            "objective": found.objective,
+        },
+        "surrogate_loo_error": found.loo_error,
+        "simulations": len(campaign.store.keys()),
+        "quasi_static_error": optimum.quasi_static_error,
+        "load_cmod": curve_result(optimum),
+        "peak_load_n": load,
+        "cmod_at_peak_mm": cmod / MM,
+        "measured_peak_load_n": measured_load,
+        "measured_cmod_at_peak_mm": measured_cmod / MM,
+        "peak_load_mismatch": load / measured_load - 1,
+        "fracture_energy_j_per_m2": optimum.energy.external / ligament_area(problem.specimen),
+    }
+
+
+def identification_arrays(campaign: Campaign, found: Estimate, optimum: Solution) -> dict[str, Any]:
+    """The arrays of an identification, by the names of layout `IDENTIFY`."""
+    measured, field = campaign.measured, campaign.measured.field
+    runs = campaign.solutions(found.design.nodes())
+    shape = found.design.shape
+    seen = [at_stations(p, s, campaign.points, measured.cmod) for p, s in runs] if field is not None else None
+    return {
+        "grid/f_max_n": found.design.f_max,
+        "grid/delta_max_m": found.design.delta_max,
+        "grid/objective": found.objective,
+        "grid/load_n": np.reshape([s.curve.load_at(measured.cmod) for _, s in runs], (*shape, -1)),
+        "grid/displacement_m": None if seen is None else np.reshape(seen, (*shape, *np.shape(seen[0]))),
+        "stations/cmod_m": measured.cmod,
+        "points_m": None if field is None else campaign.points,
+        "measured/load_n": measured.load,
+        "measured/load_std_n": measured.load_std,
+        "measured/displacement_m": None if field is None else field.displacement,
+        "measured/valid": None if field is None else field.valid,
+        "optimum/time_s": optimum.curve.time,
+        "optimum/cmod_m": optimum.curve.cmod,
+        "optimum/load_n": optimum.curve.load,
+        "optimum/load_line_m": optimum.curve.load_line,
+    }
+
+
+def _summary(found: Estimate) -> str:
+    text = f"f_max = {found.f_max:.4g} N, delta_max = {found.delta_max:.4g} m"
+    if found.uncertainty is not None:
+        (a, b), (c, d) = found.uncertainty.f_max, found.uncertainty.delta_max
+        text += f"; 95 %: {a:.4g} to {b:.4g} N, {c:.4g} to {d:.4g} m"
+    return "\n".join([text, *found.warnings])

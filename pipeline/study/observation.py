@@ -1,0 +1,95 @@
+"""Measurement and simulation brought to the same points and CMOD stations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import InputError
+from pipeline.core.field import DisplacementField
+from pipeline.core.observation import observe
+from pipeline.core.problem import Problem, Solution
+from pipeline.core.units import MM
+from pipeline.inverse.observations import Measured
+
+PARTED = 0.1  # of delta_max: a bond opened farther no longer joins two flanks
+
+
+def observe_solution(problem: Problem, solution: Solution, points: np.ndarray) -> np.ndarray:
+    """Displacements (frames, p, 2) in m of material points in the frames of a solution; NaN where invalid."""
+    parted = PARTED * np.where(np.isfinite(problem.law.delta_max), problem.law.delta_max, np.inf)
+    values, _ = observe(problem.particles, problem.bonds, solution.displacement, points, parted)
+    return values
+
+
+def at_stations(problem: Problem, solution: Solution, points: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """Displacements (s, p, 2) in m at CMOD stations; NaN where a station was not reached."""
+    values = observe_solution(problem, solution, points)
+    found = np.full((stations.size, len(points), 2), np.nan)
+    for k, station in enumerate(stations):
+        hit = np.flatnonzero(np.isclose(solution.cmod, station, rtol=1e-9, atol=0))
+        if hit.size:
+            found[k] = values[hit[0]]
+    return found
+
+
+def nearest_points(field: DisplacementField, wanted: np.ndarray) -> np.ndarray:
+    """Numbers (p,) of the measured points that stand for the wanted ones, nearest first come.
+
+    The simulation is then observed at the measured points themselves, so that nothing is interpolated
+    across a crack whose path is unknown.
+
+    Raises
+    ------
+    InputError
+        where a wanted point is farther from every measured one than two steps of their grid
+    """
+    distance = np.hypot(*(field.points[:, None] - wanted).transpose(2, 0, 1))
+    seldom = ~field.valid.any(axis=0)
+    distance[seldom] = np.inf
+    nearest = np.argmin(distance, axis=0)
+    apart = distance[nearest, np.arange(len(wanted))]
+    step = _step(field.points)
+    if apart.max() > 2 * step:
+        worst = wanted[np.argmax(apart)] / MM
+        raise InputError(
+            f"[observation] asks for a point at ({worst[0]:g}, {worst[1]:g}) mm, but the nearest measured point is "
+            f"{apart.max() / MM:.3g} mm away: move columns_mm and rows_mm into the measured field"
+        )
+    return nearest
+
+
+def _step(points: np.ndarray) -> float:
+    """Typical distance (m) of a measured point to its nearest neighbour."""
+    from scipy.spatial import cKDTree
+
+    distance, _ = cKDTree(points).query(points, k=2)
+    return float(np.median(distance[:, 1]))
+
+
+def measured_test(
+    curve: LoadCurve, field: DisplacementField | None, stations: np.ndarray, wanted: np.ndarray
+) -> Measured:
+    """A measured test at its stations, at the measured points nearest to the wanted ones.
+
+    Parameters
+    ----------
+    curve : LoadCurve with load_std
+    field : DisplacementField counted by time, or None
+    stations : (s,) array, m
+    wanted : (p, 2) array, m
+    """
+    picked = None
+    if field is not None:
+        chosen = nearest_points(field, wanted)
+        series = DisplacementField(
+            field.points[chosen],
+            field.displacement[:, chosen],
+            field.valid[:, chosen],
+            field.std[:, chosen],
+            field.abscissa,
+        )
+        picked = series.at(curve.time_at(stations))
+    load = curve.load_at(stations)
+    std = None if curve.load_std is None else np.interp(stations, curve.cmod, curve.load_std)
+    return Measured(stations, picked, load, std)
