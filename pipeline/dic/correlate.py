@@ -108,7 +108,7 @@ def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Cor
 def _unreached(n: int) -> dict[str, np.ndarray]:
     widths = {"warp": 6, "level": 2, "covariance": 3, "suspect": 4}
     found = {name: np.zeros((n, k)) for name, k in widths.items()}
-    found |= {name: np.zeros(n) for name in ("residual", "contrast", "score")}
+    found |= {name: np.zeros(n) for name in ("residual", "contrast", "score", "bend")}
     return found | {
         "zncc": np.full(n, -1.0),
         "outcome": np.full(n, -1, np.int32),
@@ -201,7 +201,7 @@ def _sheet(match: Match, found: dict[str, np.ndarray], noise: MatchNoise) -> She
     status[status == Status.OK] = Status.POOR_MATCH
     empty = {"line": 2, "far": 6, "jump": 2, "jump_std": 2}
     sheet = Sheet(
-        **{k: found[k].copy() for k in ("warp", "zncc", "iterations", "covariance", "level", "suspect")},
+        **{k: found[k].copy() for k in ("warp", "zncc", "iterations", "covariance", "level", "suspect", "bend", "count")},
         **{k: np.full((n, width), np.nan) for k, width in empty.items()},
         status=status.astype(np.uint8),
         variance=np.full(n, np.inf),

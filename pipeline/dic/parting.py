@@ -20,6 +20,7 @@ from pipeline.dic.status import Status
 _SECTORS = 12
 _WAVES = 4
 _GAIN = 36.0  # χ² that a cut must save: 1 in 1000 under white noise, for six parameters and the search of the line
+_BENT = 0.75  # share of the saving from which second-order terms explain it; they explain at most 0.55 of a step
 _SIDE = 25.0  # χ² by which the centre's side must be preferred
 _CLOSE_PX = 1.0  # nearer to the centre than this a line is not located by its pixels, which the gap has blurred …
 _CLOSE_SIDE = 150.0  # … unless χ² speaks so clearly
@@ -36,8 +37,10 @@ class Sheet:
     iterations: np.ndarray
     covariance: np.ndarray  # (n, 3) of u, v and mixed, per grey² of noise
     level: np.ndarray
+    count: np.ndarray  # (n,) pixels of the subset
     variance: np.ndarray  # (n,) grey², of the part that holds the centre
     suspect: np.ndarray  # (n, 4) line and jump that the score test proposes
+    bend: np.ndarray  # (n,) grey², by which second-order terms would lower Σe²
     line: np.ndarray
     far: np.ndarray
     jump: np.ndarray
@@ -129,13 +132,22 @@ def _try_whole(match: Match, sheet: Sheet, noise: MatchNoise, points: np.ndarray
 def adopt(sheet: Sheet, points: np.ndarray, found: dict[str, np.ndarray], noise: MatchNoise, *, better: bool) -> None:
     """Take over whole-subset matches of `points`, all of them or only those that are sound; changes `sheet`."""
     variance = found["residual"] / np.maximum(found["count"] - PARAMETERS, 1)
-    fine = (found["outcome"] == 0) & (variance <= noise.limit(found["count"])) & (found["score"] <= noise.suspicious)
+    fine = (variance <= noise.limit(found["count"])) & (found["score"] <= noise.suspicious)
+    fine = (found["outcome"] == 0) & (fine | _bent(found, variance, noise))
     take = fine if better else np.ones(len(points), bool)
     to = points[take]
-    for name in ("warp", "zncc", "iterations", "covariance", "level", "suspect"):
+    for name in ("warp", "zncc", "iterations", "covariance", "level", "suspect", "bend", "count"):
         getattr(sheet, name)[to] = found[name][take]
     sheet.variance[to] = np.where(found["outcome"] == 0, variance, np.inf)[take]
     sheet.status[points[fine]] = Status.OK
+
+
+def _bent(found: dict[str, np.ndarray], variance: np.ndarray, noise: MatchNoise) -> np.ndarray:
+    """Subsets whose misfit is clear and is that of a smoothly bent field: the affine warp is its low-pass filter."""
+    excess = (variance - noise.variance) * found["count"]
+    straight = variance - found["bend"] / np.maximum(found["count"] - PARAMETERS, 1)
+    clear = excess > 4 * noise.variance * np.sqrt(2.0 * found["count"]) * noise.excess
+    return clear & (found["bend"] > _BENT * excess) & (straight <= noise.limit(found["count"]))
 
 
 def _candidates(match: Match, sheet: Sheet, points: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,14 +190,16 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     far = found["far_matched"].astype(bool) & (far_variance <= noise.limit(far_n))
     jump, jump_std = _jumps(found, noise.variance)
     single, parted, swapped = found["cost"].T
-    saves = single - parted > _GAIN * noise.score
+    excess = (sheet.variance[points] / noise.variance - 1) * np.maximum(sheet.count[points], 1)  # not clipped, as the bend is not
+    bent = sheet.bend[points] / noise.variance > _BENT * np.maximum(excess, single - parted)
+    saves = (single - parted > _GAIN * noise.score) & ~bent
     fits = found["attempted"].astype(bool) & (variance <= noise.limit(near_n))
     one_piece = (found["near_fit"][:, 4] <= noise.refused) & ~(far & (found["far_fit"][:, 4] > noise.refused))
     preferred = (swapped - parted) / noise.score
     told = (preferred > _SIDE) & ((found["line"][:, 1] > _CLOSE_PX) | (preferred > _CLOSE_SIDE))
     told |= far & (np.linalg.norm(jump, axis=1) < _HARMLESS_PX)
-    count = 2 * near_n.mean()  # of the whole subset, within the accuracy of its limit
-    whole = ~saves & (sheet.variance[points] <= noise.limit(np.full(len(points), count)))
+    straight = sheet.variance[points] - sheet.bend[points] / np.maximum(sheet.count[points] - PARAMETERS, 1)
+    whole = ~saves & (straight <= noise.limit(sheet.count[points]))
     sheet.status[points] = np.select(
         [whole, fits & saves & one_piece & told, fits & saves & one_piece, fits & saves],
         [Status.OK, Status.SPLIT, Status.ON_CRACK, Status.TWO_CRACKS],

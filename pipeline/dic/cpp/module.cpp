@@ -63,7 +63,7 @@ void put(const Warp &w, double *out) {
 
 nb::dict unpack(const std::vector<PointResult> &results) {
   const std::size_t n = results.size();
-  double *warp, *zncc, *residual, *level, *covariance, *contrast, *score, *line;
+  double *warp, *zncc, *residual, *level, *covariance, *contrast, *score, *bend, *line;
   int *outcome, *iterations, *count;
   nb::dict out;
   out["warp"] = array<double>(n, 6, warp);
@@ -73,6 +73,7 @@ nb::dict unpack(const std::vector<PointResult> &results) {
   out["covariance"] = array<double>(n, 3, covariance);
   out["contrast"] = list<double>(n, contrast);
   out["score"] = list<double>(n, score);
+  out["bend"] = list<double>(n, bend);
   out["suspect"] = array<double>(n, 4, line);
   out["outcome"] = list<int>(n, outcome);
   out["iterations"] = list<int>(n, iterations);
@@ -80,7 +81,7 @@ nb::dict unpack(const std::vector<PointResult> &results) {
   for (std::size_t i = 0; i < n; ++i) {
     const PointResult &r = results[i];
     put(r.fit.warp, warp + 6 * i);
-    zncc[i] = r.fit.zncc, residual[i] = r.fit.residual, contrast[i] = r.fit.contrast, score[i] = r.suspicion.score;
+    zncc[i] = r.fit.zncc, residual[i] = r.fit.residual, contrast[i] = r.fit.contrast, score[i] = r.suspicion.score, bend[i] = r.bend;
     level[2 * i] = r.fit.gain, level[2 * i + 1] = r.fit.offset;
     covariance[3 * i] = r.fit.inverse[0], covariance[3 * i + 1] = r.fit.inverse[7];
     covariance[3 * i + 2] = r.fit.inverse[1];

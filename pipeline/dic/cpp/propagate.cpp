@@ -8,6 +8,7 @@
 namespace dic {
 namespace {
 
+constexpr double kAsk = 16;  // score from which it is worth knowing whether the field is bent
 constexpr int kTries = 4;  // a point that failed is tried again when a better neighbour turns up
 
 struct Worker {
@@ -25,8 +26,11 @@ PointResult solve(const Task &task, int i, const Warp &guess, Worker &worker) {
   }
   r.fit = fit(worker.pixels, *task.current, task.points[i], guess, task.settings, worker.bench);
   r.count = worker.pixels.count;
-  if (r.fit.outcome == Outcome::Converged && r.fit.zncc > task.accept)
-    r.suspicion = screen(worker.pixels, worker.bench.error.data(), r.fit, r.fit.residual / std::max(r.count - 8, 1), task.settings.half);
+  if (r.fit.outcome != Outcome::Converged || r.fit.zncc <= task.accept) return r;
+  const float *error = worker.bench.error.data();
+  const int half = task.settings.half;
+  r.suspicion = screen(worker.pixels, error, r.fit, r.fit.residual / std::max(r.count - 8, 1), half);
+  if (r.suspicion.score > kAsk) r.bend = bend(worker.pixels, error, r.fit, half);
   return r;
 }
 

@@ -19,6 +19,7 @@ struct Task {
 struct PointResult {
   Fit fit;
   Suspicion suspicion;
+  double bend = 0;  // see screen.hpp; only where the score gives reason to ask
   int count = 0;
   bool reached = false;
 };

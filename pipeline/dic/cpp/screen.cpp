@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lanes.hpp"
+#include "linear.hpp"
 
 namespace dic {
 namespace {
@@ -92,6 +93,36 @@ Suspicion screen(const Pixels &pixels, const float *error, const Fit &fit, doubl
   }
   orient(worst);
   return worst;
+}
+
+double bend(const Pixels &p, const float *error, const Fit &fit, int half) {
+  double score[6] = {}, matrix[36] = {}, affine[6][6] = {}, level[6] = {}, contrast[6] = {};
+  for (int i = 0; i < p.count; ++i) {
+    const double dx = p.dx[i], dy = p.dy[i], xi = p.xi[i], eta = p.eta[i], f = p.grey[i] - fit.grey;
+    const double a = xi * xi / (half * half), b = xi * eta / (half * half), c = eta * eta / (half * half);
+    const double q[6] = {dx * a, dx * b, dx * c, dy * a, dy * b, dy * c};
+    const double j[6] = {dx, dy, dx * xi, dx * eta, dy * xi, dy * eta};
+    for (int k = 0; k < 6; ++k) {
+      score[k] += q[k] * error[i], level[k] += q[k], contrast[k] += q[k] * f;
+      for (int l = 0; l < 6; ++l) matrix[6 * k + l] += q[k] * q[l], affine[k][l] += q[k] * j[l];
+    }
+  }
+  for (int k = 0; k < 6; ++k)
+    for (int l = 0; l < 6; ++l) affine[k][l] -= level[k] * fit.mean[l] + contrast[k] * fit.along[l];
+  for (int k = 0; k < 6; ++k) {
+    double t[6] = {};
+    for (int m = 0; m < 6; ++m)
+      for (int n = 0; n < 6; ++n) t[m] += fit.inverse[6 * m + n] * affine[k][n];
+    for (int l = 0; l < 6; ++l) {
+      matrix[6 * k + l] -= level[k] * level[l] / p.count + contrast[k] * contrast[l] / fit.contrast;
+      for (int m = 0; m < 6; ++m) matrix[6 * k + l] -= t[m] * affine[l][m];
+    }
+  }
+  double inverse[36], drop = 0;
+  if (!invert_symmetric(matrix, 6, 6, inverse)) return 0;
+  for (int k = 0; k < 6; ++k)
+    for (int l = 0; l < 6; ++l) drop += score[k] * inverse[6 * k + l] * score[l];
+  return drop;
 }
 
 }  // namespace dic

@@ -13,4 +13,7 @@ struct Suspicion {
 // `error` as fit() leaves it in the bench; `variance` of the error of one pixel.
 Suspicion screen(const Pixels &pixels, const float *error, const Fit &fit, double variance, int half);
 
+// By how much second-order terms of the warp would lower Σ e²: what a smoothly bent field leaves over is no crack.
+double bend(const Pixels &pixels, const float *error, const Fit &fit, int half);
+
 }  // namespace dic
