@@ -89,7 +89,8 @@ def correlate(reference: np.ndarray, deformed: np.ndarray, settings: Settings | 
 def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Correlation | None) -> Correlation:
     """The whole chain: propagate, learn the noise, cut what one warp does not explain, judge."""
     found = _from_start(match, start) if start is not None else _unreached(match.grid.size)
-    found = _seeded(match, reference, current, found)
+    drift = np.zeros(2) if start is None or not start.valid.any() else np.median(start.warp[start.valid, :2], axis=0)
+    found = _seeded(match, reference, current, found, drift, 1 if start is not None and _good(match, found).any() else _ROUNDS)
     good = _good(match, found)
     if good.sum() < max(3, 0.02 * good.size):
         raise ConvergenceError(
@@ -135,17 +136,24 @@ def _from_start(match: Match, start: Correlation) -> dict[str, np.ndarray]:
 
 
 def _seeded(
-    match: Match, reference: np.ndarray, current: np.ndarray, found: dict[str, np.ndarray]
+    match: Match,
+    reference: np.ndarray,
+    current: np.ndarray,
+    found: dict[str, np.ndarray],
+    drift: np.ndarray,
+    rounds: int,
 ) -> dict[str, np.ndarray]:
     """Propagate from seeds until no part of the grid is left that a seed can be found for."""
     hopeless = np.zeros(match.grid.size, bool)
-    for _ in range(_ROUNDS):
+    if match.carried is not None:  # what was lost when the reference was renewed cannot be found again
+        hopeless = ~np.isfinite(match.carried[:, 0])
+    for _ in range(rounds):
         good = _good(match, found)
         spots = _spots(match.grid, ~good & ~hopeless)
         if not spots.size:
             break
         hopeless[spots] = True
-        seeds, guesses = _search(match, reference, current, spots)
+        seeds, guesses = _search(match, reference, current, spots, drift)
         if not seeds.size:
             continue
         fresh = match.core.propagate(
@@ -159,7 +167,7 @@ def _seeded(
             accept=match.settings.accept_zncc,
             **match.settings.solver(),
         )
-        better = ~good & (fresh["zncc"] > found["zncc"])
+        better = ~good & ((fresh["zncc"] > found["zncc"]) | ((found["outcome"] < 0) & (fresh["outcome"] >= 0)))
         found = {name: np.where(better.reshape(-1, *[1] * (v.ndim - 1)), fresh[name], v) for name, v in found.items()}
     return found
 
@@ -177,7 +185,7 @@ def _spots(grid: Grid, missing: np.ndarray) -> np.ndarray:
 
 
 def _search(
-    match: Match, reference: np.ndarray, current: np.ndarray, spots: np.ndarray
+    match: Match, reference: np.ndarray, current: np.ndarray, spots: np.ndarray, drift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Those spots that are found again, and their warps (k, 6)."""
     half = match.settings.half + 8
@@ -188,7 +196,7 @@ def _search(
         at = (round(column), round(row))
         if not (0 <= at[0] < reference.shape[1] and 0 <= at[1] < reference.shape[0]):
             continue
-        place = find(reference, current, at, half, match.settings.search_px)
+        place = find(reference, current, at, half, match.settings.search_px, tuple(drift - carried[:2]))
         if place is not None and place.certain:
             seeds.append(spot)
             guesses.append(carried + [*place.shift, 0, 0, 0, 0])

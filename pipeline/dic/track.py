@@ -1,0 +1,154 @@
+"""A series of pictures, followed in time; the reference is renewed when the match decays.
+
+Every warp leads from frame 0: a renewed reference is sampled where the points have been carried, so that the same
+material is matched and nothing is left to be composed afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.core.field import DisplacementField
+from pipeline.dic.camera import View
+from pipeline.dic.core import core
+from pipeline.dic.correlate import checked, matched
+from pipeline.dic.correlation import Correlation
+from pipeline.dic.grid import Grid
+from pipeline.dic.parting import Match
+from pipeline.dic.settings import Settings
+
+_LOST = 0.05  # share of the points that may fail before the reference is renewed
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """A reference: the picture, and how the points came there (None: it is frame 0)."""
+
+    image: np.ndarray
+    picture: Any
+    carried: Correlation | None
+
+    def match(self, current: Any, grid: Grid, settings: Settings) -> Match:
+        if self.carried is None:
+            return Match(core(), self.picture, current, grid, settings)
+        c = self.carried
+        lost = np.where(c.valid[:, None], c.warp, np.nan)
+        both = c.split & np.isfinite(c.far[:, 0])
+        line = np.where(both[:, None], c.line, [0.0, -1.0])
+        far = np.where(both[:, None], c.far, lost)
+        return Match(core(), self.picture, current, grid, settings, lost, far, line)
+
+
+def track(
+    frames: Iterable[np.ndarray], settings: Settings | None = None, *, renew_znssd: float = 0.25
+) -> Iterator[Correlation]:
+    """Follow the points of the first frame through the others.
+
+    Parameters
+    ----------
+    frames : pictures of one size, the first unloaded; read one at a time, two are kept
+    settings : Settings; `search_px` is against the frame before
+    renew_znssd : median ZNSSD of the sound points above which the frame before becomes the reference
+
+    Yields
+    ------
+    One Correlation a frame after the first; displacements are from frame 0, and the standard deviations of renewed
+    references add up in squares.
+
+    Raises
+    ------
+    InputError
+        for pictures that cannot be used, naming the frame
+    ConvergenceError
+        where nothing is found again
+    """
+    settings = settings or Settings()
+    series = iter(frames)
+    first = checked(next(series), "frame 0")
+    grid = Grid.over(first.shape, settings)  # type: ignore[arg-type]
+    base = _Base(first, core().Picture(first), None)
+    before: tuple[np.ndarray, Any, Correlation] | None = None
+    sound = 0.0
+    for number, frame in enumerate(series, start=1):
+        grey = checked(frame, f"frame {number}")
+        if grey.shape != first.shape:
+            raise InputError(
+                f"frame {number} is {grey.shape[1]} × {grey.shape[0]} px, frame 0 {first.shape[1]} × {first.shape[0]} px"
+            )
+        picture = core().Picture(grey)
+        start = before[2] if before else None
+        result = _against(base, picture, grey, grid, settings, start, number)
+        if before and before[2] is not base.carried and _decayed(result, grey.shape, sound, renew_znssd):
+            base = _Base(*before)
+            again = _against(base, picture, grey, grid, settings, start, number)
+            result = again if result is None or again is None or again.valid.sum() >= result.valid.sum() else result
+            sound = 0.0
+        if result is None:
+            raise ConvergenceError(f"frame {number}: the speckle of the frame before is not found again")
+        sound = max(sound, _share(result, grey.shape))
+        before = (grey, picture, result)
+        yield result
+
+
+def _against(
+    base: _Base,
+    picture: Any,
+    grey: np.ndarray,
+    grid: Grid,
+    settings: Settings,
+    start: Correlation | None,
+    number: int,
+) -> Correlation | None:
+    """Match one frame; None where nothing is found again."""
+    try:
+        result = matched(base.match(picture, grid, settings), base.image, grey, start)
+    except ConvergenceError as error:
+        if start is None:
+            raise ConvergenceError(f"frame {number}: {error}") from error
+        return None
+    return result if base.carried is None else replace(result, std=np.hypot(result.std, base.carried.std))
+
+
+def _decayed(result: Correlation | None, shape: tuple[int, ...], sound: float, renew_znssd: float) -> bool:
+    if result is None or not result.valid.any():
+        return True
+    return bool(np.median(result.znssd[result.valid]) > renew_znssd or _share(result, shape) < sound - _LOST)
+
+
+def _share(result: Correlation, shape: tuple[int, ...]) -> float:
+    """Share of sound points among those that have not left the picture."""
+    now = result.points + np.nan_to_num(result.warp[:, :2])
+    margin = 1.5 * (result.points.min() if result.points.size else 0)
+    inside = np.all((now > margin) & (now < np.array(shape[::-1]) - 1 - margin), axis=1)
+    return float(result.valid[inside].mean()) if inside.any() else 0.0
+
+
+def tracked_field(
+    frames: Iterable[np.ndarray], time: np.ndarray, view: View, settings: Settings | None = None
+) -> DisplacementField:
+    """The displacements of a series in specimen coordinates, m; `time` (frames,) in s counts frame 0 too."""
+    time = np.asarray(time, float)
+    moved: list[np.ndarray] = []
+    valid: list[np.ndarray] = []
+    std: list[np.ndarray] = []
+    points = np.zeros((0, 2))
+    for result in track(frames, settings):
+        points = result.points
+        moved.append(view.vector(result.displacement))
+        valid.append(result.valid)
+        std.append(np.sqrt(np.mean(result.std**2, axis=1)) * view.metre_per_px)
+    if len(moved) + 1 != time.size:
+        raise InputError(f"{len(moved) + 1} frames but {time.size} times: give one time a frame")
+    still = np.zeros(points.shape)
+    return DisplacementField(
+        points=view.point(points),
+        displacement=np.array([still, *moved]),
+        valid=np.array([np.ones(len(points), bool), *valid]),
+        std=np.array([np.zeros(len(points)), *std]),
+        abscissa=time,
+    )
