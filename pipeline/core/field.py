@@ -82,9 +82,17 @@ def rigid_residual(points: np.ndarray, residual: np.ndarray, valid: np.ndarray) 
 
 
 def rigid_motion(points: np.ndarray, displacement: np.ndarray, use: np.ndarray) -> np.ndarray:
-    """The least-squares translation and small rotation of the used points, at all points; (n, 2), m."""
+    """The least-squares translation and small rotation of the used points, at all points; (..., n, 2), m.
+
+    Parameters
+    ----------
+    points : (n, 2) array, m
+    displacement : (..., n, 2) array, m
+    use : (n,) bool array
+    """
     arm = points - points[use].mean(axis=0)
     turned = np.column_stack([-arm[:, 1], arm[:, 0]])
-    shift = displacement[use].mean(axis=0)
-    angle = np.sum(turned[use] * (displacement[use] - shift)) / np.sum(turned[use] ** 2)
+    known = displacement[..., use, :]
+    shift = known.mean(axis=-2, keepdims=True)
+    angle = np.sum(turned[use] * (known - shift), axis=(-2, -1), keepdims=True) / np.sum(turned[use] ** 2)
     return shift + angle * turned

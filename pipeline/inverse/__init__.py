@@ -1,0 +1,1 @@
+"""The paper's inverse estimation: simulations on a grid, their Lagrange multinomial, Newton, intervals."""
