@@ -81,9 +81,7 @@ class Model:
             specimen=self.bundle.specimen,
             particles=self.particles,
             bonds=self.bonds,
-            law=self.mixture.law(
-                self.bonds, self.bundle.specimen.thickness, f_max * self.force_scale, delta_max
-            ),
+            law=self.mixture.law(self.bonds, self.bundle.specimen.thickness, f_max * self.force_scale, delta_max),
             grips=self.grips,
             gauge=self.gauge,
             kinematics=self.bundle.model.motion,
@@ -132,7 +130,7 @@ def read_phases(bundle: Bundle) -> tuple[PhaseMap | None, tuple[str, ...]]:
     if bundle.labels is None and bundle.specimen_image is None:
         return None, ("no image of the specimen: it is mastic throughout",)
     if bundle.image_frame is None:
-        raise InputError("experiment.toml: an image of the specimen needs [specimen.image] with mm_per_px and origin_px")
+        raise InputError("experiment.toml: an image of the specimen needs [specimen.image]: mm_per_px and origin_px")
     placement = bundle.image_frame.placement()
     if bundle.labels is not None:
         phase_map, stones = from_labels(read_labels(bundle.labels), placement)

@@ -136,5 +136,3 @@ def simulation_arrays(problem: Problem, solution: Solution, points: np.ndarray, 
         "observation/points_m": points,
         "observation/displacement_m": seen,
     }
-
-

@@ -1,0 +1,1 @@
+"""Specimens and data shared by tests."""
