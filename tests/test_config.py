@@ -55,7 +55,7 @@ def test_options_that_are_none_are_defaults_and_others_win_over_the_file(tmp_pat
     ],
 )
 def test_a_refusal_names_key_value_and_rule(options, sentence):
-    with pytest.raises(InputError, match="^options: ") as error:
+    with pytest.raises(InputError, match=r"^options: ") as error:
         run_settings(options)
     assert sentence in str(error.value)
 

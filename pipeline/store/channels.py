@@ -180,9 +180,13 @@ def _split_unit(cell: str) -> tuple[str, str]:
 
 
 def _fit(title: str, role: str) -> int:
-    """Letters of the longest synonym that the title contains, whole words only; one-letter names must be all of it."""
-    words = normalised(title)
-    return max((len(s) for s in SYNONYMS[role] if (s == words if len(s) == 1 else f" {s} " in f" {words} ")), default=0)
+    """How well a title fits: letters of its longest synonym, as whole words; one-letter names must be all of it.
+
+    A word for the crack or its gauge counts more than any other: 'displacement (clip gauge)' is CMOD.
+    """
+    words = re.sub(r"(?<=[a-z])(?=\d)", " ", normalised(title))
+    fits = [len(s) for s in SYNONYMS[role] if (s == words if len(s) == 1 else f" {s} " in f" {words} ")]
+    return max(fits) + (100 if role == "cmod" else 0) if fits else 0
 
 
 def _best_role(title: str) -> str | None:

@@ -165,11 +165,22 @@ def _header(guess: _Guess, lines: list[str], first: int) -> tuple[tuple[str, ...
             if found:
                 break
             continue
-        for gap in (r"\s{2,}", r"\s+(?![\[(<])") if guess.separator == " " else ():  # titles of several words
-            cells = cells if len(cells) == guess.width else re.split(gap, lines[index].strip())
+        if guess.separator == " ":
+            cells = _titles_between_blanks(lines[index].strip(), cells, guess.width)
         if len(cells) > guess.width and not any(cells[guess.width :]):
             cells = cells[: guess.width]
         if len(cells) != guess.width:
             break
         found.insert(0, tuple(cells))
     return tuple(found)
+
+
+def _titles_between_blanks(line: str, words: list[str], width: int) -> list[str]:
+    """Titles of several words: apart by wide gaps, or each ended by its unit in brackets, or one word and a unit."""
+    ways = (
+        words,
+        re.split(r"\s{2,}", line),
+        re.findall(r"[^\s\[(<][^\[(<]*[\[(<][^\])>]*[\])>]", line),
+        re.split(r"\s+(?![\[(<])", line),
+    )
+    return next((cells for cells in ways if len(cells) == width), words)

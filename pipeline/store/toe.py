@@ -9,14 +9,14 @@ import numpy as np
 from pipeline.core.curve import LoadCurve
 from pipeline.core.units import MM, UM
 
-WINDOWS = (
-    (0.2, 0.5),
-    (0.1, 0.7),
-)  # of the peak load: where the rise is taken as straight; the second when rows are few
-ROWS = 5  # wanted in the first window
-SLACK = 0.02  # of the CMOD at the window's upper end: a row farther off the line belongs to the toe
+STARTS, WIDTHS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3), (0.2, 0.3, 0.4, 0.5)  # windows of the rise, shares of the peak
+SURE = 0.05  # relative standard error of the compliance that a window may have
+ALIKE = 1.02  # a lower window is taken while its compliance, less its standard error, is below this times the least
+WIDE = ((0.2, 0.5), (0.1, 0.7))  # where no such window is sure enough
+ROWS, FEWEST = 5, 3  # in a window, and in a wide one
+SLACK = 0.005  # of the elastic CMOD at half the peak: a row farther off the line belongs to the toe
 IDLE = 0.005  # of the peak: below it the machine was waiting
-MOST = 400  # rows that carry the fit: the robust line compares all pairs
+MOST = 400  # rows that carry a fit: the robust line compares all pairs
 
 
 @dataclass(frozen=True)
@@ -29,21 +29,26 @@ class Rise:
     compliance : float, m/N
     scatter : float, m; robust standard deviation of the rows about the line
     first : int; row where the straight part begins
+    window : its ends, shares of the peak load
+    error : float, m/N; standard error of the compliance
     """
 
     foot: float
     compliance: float
     scatter: float
     first: int
+    window: tuple[float, float]
+    error: float
 
 
 def without_foot(curve: LoadCurve) -> tuple[LoadCurve, list[str]]:
     """The curve with the extrapolated rise starting at zero, what lies before it cut, and what was done.
 
-    A straight line is fitted (median of the slopes of all pairs: Theil 1950, Sen 1968) to CMOD over load
-    between 20 and 50 % of the peak. CMOD is counted from where it meets zero load, and so is the load-line
-    displacement. Rows before the curve has joined the line (within 2 % of the CMOD at the window's end,
-    or four times the scatter), and rows of waiting, are cut; where the first row kept is not at the origin
+    A straight line is fitted (median of the slopes of all pairs: Theil 1950, Sen 1968) to CMOD over load in
+    the steepest part of the rise: a toe below it and softening above it are both flatter. CMOD is counted
+    from where the line meets zero load, and so is the load-line displacement. Rows before the curve has
+    joined the line (within 0.5 % of the elastic CMOD at half the peak, or four times the scatter), and rows
+    of waiting, are cut; where the first row kept is not at the origin
     a row (0, 0) is put before it, on the line. Times are not shifted.
     """
     rise = fit_rise(curve, curve.cmod)
@@ -63,19 +68,39 @@ def without_foot(curve: LoadCurve) -> tuple[LoadCurve, list[str]]:
 
 
 def fit_rise(curve: LoadCurve, displacement: np.ndarray) -> Rise | None:
-    """The straight part of `displacement` (n,), m, over load; None where it has fewer than three rows."""
+    """The straight part of `displacement` (n,), m, over load; None where it has fewer than three rows.
+
+    Windows begin at 5 to 30 % of the peak and are a fifth of it wide, wider where that holds fewer than five
+    rows. Of those whose compliance is sure to 5 % the lowest one is taken that is as steep as the steepest,
+    within 2 % and its own standard error.
+    """
+    fits = [_narrowest(curve, displacement, start) for start in STARTS]
+    sure = [fit for fit in fits if fit is not None and 0 <= fit.error < SURE * fit.compliance]
+    if sure:
+        least = min(fit.compliance for fit in sure)
+        return next(fit for fit in sure if fit.compliance - fit.error <= ALIKE * least)
+    wide = (_fitted(curve, displacement, window, rows) for window, rows in zip(WIDE, (ROWS, FEWEST), strict=True))
+    return next((fit for fit in wide if fit is not None), None)
+
+
+def _narrowest(curve: LoadCurve, displacement: np.ndarray, start: float) -> Rise | None:
+    """The line through the narrowest window from `start` on that holds enough rows."""
+    fits = (_fitted(curve, displacement, (start, start + width), ROWS) for width in WIDTHS)
+    return next((fit for fit in fits if fit is not None), None)
+
+
+def _fitted(curve: LoadCurve, displacement: np.ndarray, window: tuple[float, float], fewest: int) -> Rise | None:
+    """The robust line through one window, None where it has too few rows."""
     peak = int(np.argmax(curve.load))
-    top = float(curve.load[peak])
-    for low, high in WINDOWS:
-        rows = _between(curve.load[: peak + 1], low * top, high * top)
-        if rows.size >= ROWS:
-            break
-    if rows.size < 3 or np.ptp(curve.load[rows]) == 0:
+    rows = _between(curve.load[: peak + 1], window[0] * curve.load[peak], window[1] * curve.load[peak])
+    if rows.size < fewest or np.ptp(curve.load[rows]) == 0:
         return None
     used = rows[:: max(rows.size // MOST, 1)]
     slope, foot = _median_line(curve.load[used], displacement[used])
     off = displacement[rows] - foot - slope * curve.load[rows]
-    return Rise(float(foot), float(slope), 1.4826 * float(np.median(np.abs(off))), int(rows[0]))
+    scatter = 1.4826 * float(np.median(np.abs(off)))
+    error = scatter / float(np.std(curve.load[rows]) * np.sqrt(rows.size))
+    return Rise(float(foot), float(slope), scatter, int(rows[0]), window, error)
 
 
 def _median_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -98,8 +123,8 @@ def _joined(curve: LoadCurve, rise: Rise) -> int:
     """The first row to keep: on the line, and not waiting."""
     before = slice(0, rise.first)
     off = np.abs(curve.cmod[before] - rise.foot - rise.compliance * curve.load[before])
-    reach = abs(rise.compliance) * float(curve.load.max()) * WINDOWS[0][1]
-    astray = np.flatnonzero(off > max(SLACK * reach, 4 * rise.scatter))
+    half = abs(rise.compliance) * float(curve.load.max()) / 2
+    astray = np.flatnonzero(off > max(SLACK * half, 4 * rise.scatter))
     idle = np.flatnonzero(curve.load[before] <= IDLE * float(curve.load.max()))
     return max(int(astray[-1]) + 1 if astray.size else 0, int(idle[-1]) if idle.size else 0)
 
@@ -137,9 +162,10 @@ def _rate(curve: LoadCurve) -> float:
 
 def _told(curve: LoadCurve, rise: Rise, start: int, added: bool) -> list[str]:
     """What was done, in sentences."""
+    low, high = (round(100 * end) for end in rise.window)
     sentences = [
-        f"The rise between 20 and 50 % of the peak is straight within {rise.scatter / UM:.2g} µm; extended to zero "
-        f"load it meets CMOD = {rise.foot / MM:.6g} mm, from where CMOD is now counted."
+        f"Between {low} and {high} % of the peak the rise is straight within {rise.scatter / UM:.2g} µm; extended to "
+        f"zero load it meets CMOD = {rise.foot / MM:.6g} mm, from where CMOD is now counted."
     ]
     if start:
         sentences.append(

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+import pipeline
 from pipeline.core.errors import StoreError
 from pipeline.store.atomic import write_atomically
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(pipeline.__file__).resolve().parents[1]
 
 
 def run(code: str, *arguments: object, user: int | None = None) -> subprocess.CompletedProcess[str]:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.core.errors import MissingFileError, StoreError
+from pipeline.core.errors import StoreError
 from pipeline.core.field import DisplacementField
 from pipeline.core.units import MM
 from pipeline.store.fields import field_problems, read_fields, write_fields
@@ -33,6 +33,7 @@ def random_field(frames: int, n: int, spread: str) -> DisplacementField:
     )
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.integers(1, 6), st.integers(1, 8), st.sampled_from(["one", "points", "all"]))
 def test_write_then_read_is_the_identity(tmp_path_factory, frames, n, spread):
     path = tmp_path_factory.mktemp("fields") / "fields.h5"

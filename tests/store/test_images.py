@@ -33,6 +33,7 @@ def palette_png(numbers: np.ndarray, palette: np.ndarray) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + body + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from([np.uint8, np.uint16]).flatmap(
         lambda kind: arrays(kind, st.tuples(st.integers(1, 12), st.integers(1, 12)))

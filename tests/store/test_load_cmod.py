@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.curve import LoadCurve
@@ -24,6 +24,7 @@ def problems(tmp_path):
     return read
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(*[st.floats(0.01, 100)] * 3), min_size=3, max_size=30), st.booleans())
 def test_write_then_read_is_the_identity(tmp_path_factory, rows, with_line):
     steps = np.array(rows)

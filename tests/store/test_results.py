@@ -11,14 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import pipeline
 from pipeline.core.errors import InputError, MissingFileError, StoreError
 from pipeline.store.layouts import FIELDS
 from pipeline.store.results import plain, prepare_output, read_arrays, read_result, write_arrays, write_result
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(pipeline.__file__).resolve().parents[1]
 JSON = st.recursive(
     st.none()
     | st.booleans()
@@ -34,6 +35,7 @@ class Verdict(StrEnum):
     CAUSE = "cause"
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.dictionaries(st.text(), JSON, max_size=5))
 def test_what_json_knows_comes_back_the_same(tmp_path_factory, result):
     folder = tmp_path_factory.mktemp("out")
@@ -118,7 +120,7 @@ def test_a_folder_is_made_with_its_parents_and_left_clean(tmp_path):
 def test_a_file_in_the_way_is_named(tmp_path):
     (tmp_path / "out").write_text("mine")
     for folder in (tmp_path / "out", tmp_path / "out" / "deeper"):
-        with pytest.raises(StoreError, match="out.* cannot be written: a file stands where a folder is needed"):
+        with pytest.raises(StoreError, match=r"out.* cannot be written: a file stands where a folder is needed"):
             prepare_output(folder)
     assert (tmp_path / "out").read_text() == "mine"
 

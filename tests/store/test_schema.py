@@ -44,6 +44,7 @@ def path(tmp_path):
     return tmp_path / "x.h5"
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 40), st.booleans(), st.booleans())
 def test_write_then_read_is_the_identity(tmp_path_factory, n, with_flag, long):
     given_values = values(n, b=np.arange(n) * 0.5 if long else 2.5, **({} if with_flag else {"flag": None}))
@@ -116,7 +117,7 @@ def test_a_missing_file_is_named(tmp_path):
         LAYOUT.decode(tmp_path / "x.h5")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_a_changed_bit_never_changes_an_array(tmp_path_factory, data):
     """Chunks carry check sums and so do the file's structures: arrays are either right or refused."""

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pipeline
 from pipeline.core.errors import StoreError
 from pipeline.core.problem import Solution
 from pipeline.store.simulation import MemoryStore, SimulationStore
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(pipeline.__file__).resolve().parents[1]
 KEY, OTHER = "a" * 64, "b" * 64
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.store.experiment import Experiment, parse_experiment
@@ -47,6 +47,7 @@ def experiments(draw) -> Experiment:
     return Experiment.model_validate(raw)
 
 
+@settings(max_examples=40, deadline=None)
 @given(experiments())
 def test_write_then_read_is_the_identity(experiment):
     sections, problems = parse_experiment(tomllib.loads(toml_text(experiment)))
