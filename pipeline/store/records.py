@@ -81,7 +81,7 @@ def read_record(
     _need(path.name, channels, envelope, cmod_rate)
     told = [_how_read(path.name, block), *map(_how_understood, channels.values())]
     data = _timed(
-        path.name, _complete(path.name, _signed(_quantities(channels, envelope), told), told), cmod_rate, told
+        path.name, _signed(_complete(path.name, _quantities(channels, envelope), told), told), cmod_rate, told
     )
     curve = LoadCurve(**data)
     if remove_toe and not envelope:
@@ -123,13 +123,13 @@ def _signed(data: dict[str, np.ndarray], told: list[str]) -> dict[str, np.ndarra
 
 def _extreme(values: np.ndarray) -> float:
     """The value farthest from zero."""
-    return float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else 0.0
+    return float(values[np.argmax(np.abs(values))])
 
 
 def _growth(values: np.ndarray) -> float:
     """How much the last twentieth lies above the first."""
     few = max(values.size // 20, 1)
-    return float(np.nanmean(values[-few:]) - np.nanmean(values[:few]))
+    return float(np.mean(values[-few:]) - np.mean(values[:few]))
 
 
 def _complete(file: str, data: dict[str, np.ndarray], told: list[str]) -> dict[str, np.ndarray]:
@@ -158,6 +158,8 @@ def _timed(file: str, data: dict[str, np.ndarray], cmod_rate: float | None, told
         raise InputError(
             f"{file}: time stands still or runs back in {lost} of {rising.size} rows: is another column the time?"
         )
+    if rising.sum() < 3:
+        raise InputError(f"{file}: only {rising.sum()} rows follow one another in time: a curve needs at least 3")
     if lost:
         told.append(f"{lost} rows whose {'CMOD' if by_cmod else 'time'} does not increase were left out.")
     return {name: values[rising] for name, values in data.items()}

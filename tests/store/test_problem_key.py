@@ -105,7 +105,8 @@ def test_width_and_layout_of_numbers_do_not_count(problem):
 
 def test_the_key_is_the_same_in_another_process(problem):
     code = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); from test_problem_key import small_problem, ENGINE; "
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); "
+        "from test_problem_key import small_problem, ENGINE; "
         "from pipeline.store.problem_key import problem_key; print(problem_key(small_problem(), ENGINE))"
     )
     env = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "7"}
