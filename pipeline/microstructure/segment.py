@@ -187,7 +187,7 @@ def _thresholds(flat: np.ndarray, inside: np.ndarray, largest_void: float) -> tu
         upper = otsu_threshold(values[values > threshold])
         depth = valley(even[even > threshold], upper)
         if depth < BIMODAL:
-            return upper, threshold, depth
+            return upper, void_threshold(even, upper) or threshold, depth
     void_below = void_threshold(even, threshold)
     if void_below is not None and np.mean(values < void_below) > largest_void:
         void_below = None

@@ -123,6 +123,14 @@ def test_a_lattice_is_point_symmetric_about_the_mouth_and_repeats_every_60_degre
     assert steps == pytest.approx(1, abs=1e-6)  # rows √3 r apart run along the angle
 
 
+@pytest.mark.parametrize("angle", [30.0 + 60 * k for k in range(-6, 6)])
+@pytest.mark.parametrize("error", [-2e-14, 0.0, 2e-14])
+def test_round_off_in_an_angle_does_not_move_the_lattice(angle, error):
+    """30° + 60° k is where the bond whose middle is the origin changes."""
+    exact, near = (Lattice(0.4 * MM, np.deg2rad(a)) for a in (90.0, angle * (1 + error)))
+    assert near.origin == pytest.approx(exact.origin, abs=1e-15)  # m; round-off
+
+
 def test_particles_lie_line_by_line(beam):
     packing = hexagonal_packing(beam, 0.5 * MM, np.pi / 2)
     assert np.array_equal(

@@ -56,6 +56,14 @@ def test_voids_are_found_and_left_open():
     assert np.count_nonzero(void & drawn.void) > 0.9 * np.count_nonzero(void | drawn.void)
 
 
+def test_voids_that_are_the_largest_contrast_are_not_taken_for_a_phase():
+    drawn = draw(13, aggregate=190, mastic=140, noise=4, light=0.1, voids=60)
+    found = segment(drawn.image, PLACEMENT)
+    assert found.aggregate_is == AggregateIs.BRIGHT
+    assert found.void_fraction == pytest.approx(drawn.void.mean(), rel=0.1)  # as above
+    assert found.aggregate_fraction == pytest.approx((drawn.stone > 0).mean(), abs=0.02)
+
+
 def test_voids_among_dark_stones_are_found_too():
     drawn = draw(8, aggregate=80, mastic=160, noise=5, light=0.2, voids=40)
     found = segment(drawn.image, PLACEMENT)
@@ -99,6 +107,8 @@ def test_outside_the_mask_nothing_is_read_and_its_edge_is_kept():
     assert (label[49:351, 99:701] != Phase.OUTSIDE).all()  # one pixel more, for points at the very edge
     assert np.mean((label == Phase.AGGREGATE)[mask] != (drawn.stone > 0)[mask]) < 0.03  # as without a mask
     assert found.void_fraction == 0
+    alone = segment(drawn.image[50:350, 100:700], PLACEMENT)
+    assert np.mean(alone.phase_map.label != label[50:350, 100:700]) < 2e-3  # the background does not bleed in
 
 
 def test_aggregate_is_can_be_said():

@@ -29,6 +29,15 @@ def test_two_disks_with_a_neck_below_the_limit_are_two(first, ratio, share):
     assert set(at.tolist()) == {1, 2}
 
 
+@settings(max_examples=30, deadline=None)
+@given(first=st.integers(15, 60), ratio=st.floats(0.4, 1), share=st.floats(0.9, 0.99))
+def test_two_disks_with_a_wide_neck_are_one(first, ratio, share):
+    second = ratio * first
+    neck = share * second
+    apart = np.sqrt(first**2 - neck**2) + np.sqrt(second**2 - neck**2)
+    assert find_stones(disks((100, 100, first), (100 + apart, 100, second)), 4).count == 1
+
+
 def test_the_border_runs_along_the_neck():
     stones = find_stones(disks((100, 100, 50), (180, 100, 40)), 4)
     chord = 100 + (80**2 + 50**2 - 40**2) / (2 * 80)  # where the circles meet
