@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.core.field import DisplacementField
 from pipeline.dic.camera import View
@@ -87,6 +88,28 @@ class Correlation:
     def sliding(self) -> np.ndarray:
         """(n,) jump along the line, px; positive when the far side moves a quarter turn on from the normal."""
         return np.sum(self.jump * np.column_stack([-self.normal[:, 1], self.normal[:, 0]]), axis=1)
+
+    def at(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement (k, 2) and its standard deviation (k,), px, at any points (k, 2), and which of them are valid.
+
+        Each takes the warp of the nearest valid subset it lies in; beyond that subset's line, the warp of the far part.
+        """
+        known = np.flatnonzero(self.valid)
+        moved, std = np.full((len(points), 2), np.nan), np.full(len(points), np.nan)
+        if not known.size:
+            return moved, std, np.zeros(len(points), bool)
+        reach = 1.5 * max(np.diff(self.grid.columns[:2]).sum(), np.diff(self.grid.rows[:2]).sum(), 1)
+        count = min(6, known.size)
+        distance, order = cKDTree(self.points[known]).query(points, k=count)
+        for near, node in zip(distance.reshape(-1, count).T, known[order].reshape(-1, count).T, strict=True):
+            arm = points - self.points[node]
+            beyond = self.split[node] & (np.sum(arm * self.normal[node], axis=1) > self.line[node, 1])
+            warp = np.where(beyond[:, None], self.far[node], self.warp[node])
+            take = np.isnan(std) & (near <= reach) & np.isfinite(warp[:, 0])
+            basis = np.column_stack([np.ones(len(arm)), arm])
+            value = np.column_stack([np.sum(basis * warp[:, [0, 2, 3]], 1), np.sum(basis * warp[:, [1, 4, 5]], 1)])
+            moved[take], std[take] = value[take], np.sqrt(np.mean(self.std[node[take]] ** 2, axis=1))
+        return moved, std, np.isfinite(std)
 
     def reasons(self) -> dict[str, int]:
         """How many points met each fate, in words."""

@@ -252,23 +252,34 @@ def _two_planes(arm: np.ndarray, value: np.ndarray, normal: np.ndarray, blind: f
 
 
 def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float) -> tuple[float, float]:
-    """Where the step would vanish: near a tip its square grows linearly with the distance (Irwin 1957).
+    """Where the step would vanish, with its standard deviation.
 
-    The last stretch is left out, in it the flanks reach around the tip.
+    Near a sharp tip the square of the step is linear in the distance (Irwin 1957), at a hinge the step itself; the law
+    that fits better is taken, and where both fit their difference counts as uncertainty. The last stretch is left
+    out, in it the flanks' windows reach around the tip.
     """
     good = np.isfinite(size) & np.isfinite(std)
     stretch = max(0.4 * arc[-1], 4 * blind)
     use = good & (arc > arc[-1] - blind - stretch) & (arc < arc[-1] - blind)
-    if use.sum() < 5:
-        return float(arc[-1]), float(blind)
-    square = size[use] ** 2
-    (slope, level), cov = np.polyfit(arc[use], square, 1, cov=True)
-    if slope >= 0:
-        return float(arc[-1]), float(blind)
-    end = -level / slope
-    gradient = np.array([level / slope**2, -1 / slope])
-    spread = float(np.sqrt(gradient @ cov @ gradient))
+    laws = [_vanishing(arc[use], size[use], power) for power in (2, 1)] if use.sum() >= 5 else []
+    laws = [law for law in laws if law is not None]
+    if not laws:
+        return float(arc[-1]), float(np.hypot(blind, blind))
+    laws.sort(key=lambda law: law[2])
+    end, spread, left = laws[0]
+    if len(laws) == 2 and laws[1][2] < 1.5 * left:
+        spread = float(np.hypot(spread, 0.5 * (laws[1][0] - end)))
     return float(np.clip(end, arc[0], arc[-1] + 2 * blind)), float(np.hypot(spread, 0.5 * blind))
+
+
+def _vanishing(arc: np.ndarray, size: np.ndarray, power: int) -> tuple[float, float, float] | None:
+    """Root of the line through size**power, its standard deviation and what is left of size; None if it rises."""
+    (slope, level), cov = np.polyfit(arc, size**power, 1, cov=True)
+    if slope >= 0:
+        return None
+    gradient = np.array([level / slope**2, -1 / slope])
+    fitted = np.clip(slope * arc + level, 0, None) ** (1 / power)
+    return -level / slope, float(np.sqrt(gradient @ cov @ gradient)), float(np.mean((size - fitted) ** 2))
 
 
 def _isotonic(value: np.ndarray, std: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,15 @@ class Motion(Protocol):
 
     def displacement(self, points: np.ndarray, sheet: np.ndarray) -> np.ndarray:
         """Displacement (n, 2) of reference points, each as a part of the given sheet (n,)."""
+        ...
+
+
+@runtime_checkable
+class Seen(Protocol):
+    """A motion that knows by itself which material point is seen at each place of a raster."""
+
+    def origin_on(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Material points (rows·columns, 2), row by row, and whether there is any (rows·columns,) bool."""
         ...
 
 

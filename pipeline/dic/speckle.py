@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.core.errors import InputError
+from pipeline.core.errors import InputError, UnavailableError
 from pipeline.dic.core import core
-from pipeline.dic.motion import Affine, Cracked, Cut, Motion, origin_of
+from pipeline.dic.motion import Affine, Cracked, Cut, Motion, Seen, origin_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ class Camera:
 def photograph(
     speckle: Speckle,
     shape: tuple[int, int],
-    motion: Motion,
+    motion: Motion | Seen,
     camera: Camera,
     random: np.random.Generator,
     threads: int = 1,
@@ -140,7 +140,7 @@ def photograph(
 
 
 def expose(
-    speckle: Speckle, shape: tuple[int, int], motion: Motion, camera: Camera, threads: int = 1
+    speckle: Speckle, shape: tuple[int, int], motion: Motion | Seen, camera: Camera, threads: int = 1
 ) -> np.ndarray:
     """The grey values that reach the sensor, before gain, noise and rounding; (rows, columns) float."""
     fill, extra = camera.fill, int(np.ceil(4 * camera.blur))
@@ -149,8 +149,7 @@ def expose(
     band = max(1, 2**20 // axes[1].size)  # rows at a time: bounded memory for large pictures
     for first in range(0, axes[0].size, band):
         rows = axes[0][first : first + band]
-        at = np.column_stack([np.tile(axes[1], rows.size), np.repeat(rows, axes[1].size)])
-        grey[first : first + band] = _seen(speckle, at, motion, camera, threads).reshape(rows.size, -1)
+        grey[first : first + band] = _seen(speckle, axes[1], rows, motion, camera, threads)
     if camera.blur:
         from scipy.ndimage import gaussian_filter
 
@@ -159,11 +158,20 @@ def expose(
     return grey[extra : extra + shape[0], extra : extra + shape[1]]
 
 
-def _seen(speckle: Speckle, at: np.ndarray, motion: Motion, camera: Camera, threads: int) -> np.ndarray:
-    origin, material = origin_of(motion, camera.lens.straighten(at) if camera.lens.strength else at)
-    grey = np.full(len(at), camera.gap)
+def _seen(
+    speckle: Speckle, columns: np.ndarray, rows: np.ndarray, motion: Motion | Seen, camera: Camera, threads: int
+) -> np.ndarray:
+    """Grey values (rows, columns) before blur."""
+    if isinstance(motion, Seen):
+        if camera.lens.strength:
+            raise UnavailableError("a simulated field is photographed without lens distortion: set lens.strength to 0")
+        origin, material = motion.origin_on(columns, rows)
+    else:
+        at = np.column_stack([np.tile(columns, rows.size), np.repeat(rows, columns.size)])
+        origin, material = origin_of(motion, camera.lens.straighten(at) if camera.lens.strength else at)
+    grey = np.full(len(origin), camera.gap)
     grey[material] = speckle.grey(origin[material], threads)
-    return grey
+    return grey.reshape(rows.size, columns.size)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@
 #include "parallel.hpp"
 #include "propagate.hpp"
 #include "split.hpp"
+#include "triangles.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -249,4 +250,22 @@ NB_MODULE(_correlate, m) {
       "reference"_a, "current"_a, "points"_a, "candidates"_a, "first"_a, "variance"_a, "carried"_a.none(),
       "far_carried"_a.none(), "lines"_a.none(), nb::kw_only(), "half"_a, "model"_a, "max_iterations"_a, "tolerance"_a,
       "wander"_a, "threads"_a);
+
+  m.def(
+      "cover",
+      [](Doubles corners, Ints triangles, double column0, double row0, double step, int columns, int rows) {
+        need(corners.shape(1) == 2 && triangles.shape(1) == 3, "corners are pairs, triangles are triples");
+        need(columns > 0 && rows > 0 && step > 0, "a raster has columns, rows and a positive step");
+        for (std::size_t i = 0; i < triangles.shape(0); ++i)
+          for (int k = 0; k < 3; ++k)
+            need(triangles(i, k) >= 0 && triangles(i, k) < int(corners.shape(0)), "a triangle names a missing corner");
+        int *number;
+        nb::object out = array<int>(rows, columns, number);
+        {
+          nb::gil_scoped_release release;
+          cover(corners.data(), triangles.data(), triangles.shape(0), {column0, row0, step, columns, rows}, number);
+        }
+        return out;
+      },
+      "corners"_a, "triangles"_a, nb::kw_only(), "column0"_a, "row0"_a, "step"_a, "columns"_a, "rows"_a);
 }

@@ -1,0 +1,65 @@
+"""The opening across the notch, read off a displacement field like a clip gauge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.core.field import DisplacementField
+
+
+def opening(
+    field: DisplacementField, left: np.ndarray, right: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of one gauge point against the other, along the line between them.
+
+    Each foot moves with the plane fitted to the valid points within reach on its own side.
+
+    Parameters
+    ----------
+    field : DisplacementField
+    left, right : (2,) arrays, m; feet of the gauge
+    reach : float, m
+
+    Returns
+    -------
+    opening : (frames,) array, m; positive when the feet part; NaN where a foot has no valid points
+    std : (frames,) array, m
+
+    Raises
+    ------
+    InputError
+        if fewer than three points lie within reach of a foot
+    """
+    left, right = np.asarray(left, float), np.asarray(right, float)
+    along = (right - left) / np.linalg.norm(right - left)
+    middle = (left + right) / 2
+    total, variance = np.zeros(len(field.abscissa)), np.zeros(len(field.abscissa))
+    for foot, sign in ((left, -1.0), (right, 1.0)):
+        own = ((field.points - middle) @ along) * sign > 0
+        near = own & (np.linalg.norm(field.points - foot, axis=1) <= reach)
+        if near.sum() < 3:
+            raise InputError(
+                f"only {int(near.sum())} points lie within {reach * 1e3:g} mm of the gauge foot at "
+                f"({foot[0] * 1e3:g}, {foot[1] * 1e3:g}) mm: enlarge the reach or move the foot into the picture"
+            )
+        value, spread = _foot(field, near, foot, along)
+        total, variance = total + sign * value, variance + spread
+    return total, np.sqrt(variance)
+
+
+def _foot(
+    field: DisplacementField, near: np.ndarray, foot: np.ndarray, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement along the gauge (frames,) and its variance, from a plane through the valid points of each frame."""
+    value, variance = np.full(len(field.abscissa), np.nan), np.full(len(field.abscissa), np.nan)
+    for frame, usable in enumerate(field.valid):
+        use = near & usable
+        arm = field.points[use] - foot
+        basis = np.column_stack([np.ones(len(arm)), arm / max(np.abs(arm).max(initial=0), 1e-300)])
+        if use.sum() < 3 or np.linalg.matrix_rank(basis) < 3:
+            continue
+        weight = np.linalg.pinv(basis)[0]
+        value[frame] = weight @ (field.displacement[frame][use] @ along)
+        variance[frame] = np.sum((weight * field.std[frame][use]) ** 2)
+    return value, variance
