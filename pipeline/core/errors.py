@@ -13,8 +13,11 @@ class BundleError(InputError):
     """A bundle has one or more problems; all of them are listed."""
 
     def __init__(self, problems: list[str]):
+        super().__init__(problems)
         self.problems = tuple(problems)
-        super().__init__("\n".join(self.problems))
+
+    def __str__(self) -> str:
+        return "\n".join(self.problems)
 
 
 class MissingFileError(PipelineError, FileNotFoundError):

@@ -44,6 +44,11 @@ def preload_mpi() -> None:
     ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
 
 
+def _forget_shared_memory() -> None:
+    """Unlink the segment that a single rank of MPICH leaves in /dev/shm when its process ends unfinalised."""
+    Path(f"/dev/shm/mpich_shm_{os.getpid():x}_0").unlink(missing_ok=True)
+
+
 def open_lammps(log: Path | None = None) -> Any:
     """A silent LAMMPS instance that knows `bond_style cohesive`; close it after use.
 
@@ -58,6 +63,7 @@ def open_lammps(log: Path | None = None) -> Any:
     import lammps
 
     instance = lammps.lammps(cmdargs=["-screen", "none", "-log", str(log or "none"), "-nocite"])
+    _forget_shared_memory()
     if not instance.has_style("bond", "cohesive"):
         instance.command(f'plugin load "{style}"')
     if not instance.has_style("bond", "cohesive"):

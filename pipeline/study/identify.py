@@ -67,7 +67,10 @@ class Campaign:
         problems = [self.problem(*node) for node in nodes]
         keys = [problem_key(problem, self.engine.label) for problem in problems]
         wanted = dict(zip(keys, problems, strict=True))
-        run_all(self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress)
+        names = {k: f"f_max = {f:.4g} N, delta_max = {d:.4g} m" for k, (f, d) in zip(keys, nodes, strict=True)}
+        run_all(
+            self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress, names=names
+        )
         found = [self.store.get(key) for key in keys]
         return [(p, s) for p, s in zip(problems, found, strict=True) if s is not None]
 

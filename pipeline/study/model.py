@@ -7,20 +7,27 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.config import RunSettings
+from pipeline import __version__
+from pipeline.config import RunSettings, load_settings, run_settings
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Problem
+from pipeline.core.units import MM
+from pipeline.execution.progress import Progress, Silent
+from pipeline.lmp.deck import write_deck
 from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.attachment import attach_gauge, attach_grips, gauge_remark
 from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
 from pipeline.microstructure.phases import PackingReport, lay_phases
 from pipeline.microstructure.segment import segment
-from pipeline.store.bundle import Bundle
+from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.images import read_grey, read_labels
+from pipeline.store.results import prepare_output, write_result
 from pipeline.store.start import start_parameters
+from pipeline.study.pages import model_page
 
+DEFAULT_CMOD_MAX = 0.55 * MM  # of a deck for a specimen whose test has no record yet
 PRE_PEAK = (0.25, 0.5, 0.75)  # of the CMOD at peak: frames kept for the diagnosis
 
 
@@ -203,6 +210,41 @@ def grey_levels(image: np.ndarray) -> np.ndarray:
 
 def settings_of(config: Path | None, **options: object) -> RunSettings:
     """Settings of a run: a file's, if one is given, and options over it."""
-    from pipeline.config import load_settings, run_settings
-
     return load_settings(config, options) if config else run_settings(options)
+
+
+def model(
+    bundle: Path,
+    out: Path,
+    *,
+    radius_mm: float | None = None,
+    config: Path | None = None,
+    progress: Progress | None = None,
+) -> str:
+    """Build the model of a bundle's specimen; writes the LAMMPS folder, result.json, picture and report."""
+    settings = settings_of(config, radius_mm=radius_mm)
+    read = read_bundle(bundle)
+    folder = prepare_output(out)
+    (progress or Silent()).stage("building the model")
+    built = build_model(read, settings.radius)
+    cmod_max = None if read.curve is not None or read.loading.cmod_max else DEFAULT_CMOD_MAX
+    problem = built.problem(*start_parameters(read), accuracy=settings.accuracy, cmod_max=cmod_max)
+    deck = prepare_output(folder / "lammps")
+    write_deck(deck, problem)
+    report = built.report
+    result = {
+        "version": __version__,
+        "command": "model",
+        "radius_mm": problem.particles.radius / MM,
+        "particles": report.particles,
+        "bonds": report.bonds,
+        "stones": report.stones,
+        "aggregate_fraction": report.aggregate_fraction,
+        "void_particles": report.void,
+        "left_out_particles": report.islands + report.loose,
+        "bonds_by_phase": {phase.name.lower(): count for phase, count in report.bonds_by_phase},
+        "remarks": list(built.remarks),
+    }
+    write_result(folder, result)
+    model_page(folder, built, result)
+    return f"{report.particles} particles, {report.bonds} bonds, {report.stones} stones; LAMMPS deck in {deck}"
