@@ -11,7 +11,7 @@ from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.dic.core import core
 from pipeline.dic.correlation import Correlation
 from pipeline.dic.grid import Grid
-from pipeline.dic.noise import PARAMETERS, MatchNoise
+from pipeline.dic.noise import MatchNoise
 from pipeline.dic.parting import Match, Sheet, adopt, part
 from pipeline.dic.seeds import find
 from pipeline.dic.settings import Settings
@@ -22,23 +22,32 @@ _SEEDS = 9
 _OUTCOMES = np.array([Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED])
 
 
-def checked(image: np.ndarray, what: str) -> np.ndarray:
+def checked(image: np.ndarray, what: str, like: np.ndarray | None = None) -> np.ndarray:
     """The grey values as float32, rows × columns.
 
     Raises
     ------
     InputError
-        for anything but a finite picture with some contrast, at least 16 × 16 pixels
+        for anything but a finite picture with some contrast, at least 16 × 16 pixels and of the size of `like`
     """
     image = np.asarray(image)
     if image.ndim != 2:
-        raise InputError(f"{what} has {image.ndim} dimensions (shape {image.shape}), expected rows × columns of grey values")
+        raise InputError(
+            f"{what} has {image.ndim} dimensions (shape {image.shape}), expected rows × columns of grey values"
+        )
     if image.dtype.kind not in "uif":
         raise InputError(f"{what} holds values of type {image.dtype}, expected whole or real grey values")
     if min(image.shape) < 16:
         raise InputError(f"{what} has {image.shape[1]} × {image.shape[0]} px, expected at least 16 × 16")
     if not np.isfinite(image).all():
-        raise InputError(f"{what} holds {int((~np.isfinite(image)).sum())} values that are not finite: fill or crop them")
+        raise InputError(
+            f"{what} holds {int((~np.isfinite(image)).sum())} values that are not finite: fill or crop them"
+        )
+    if like is not None and image.shape != like.shape:
+        raise InputError(
+            f"{what} has {image.shape[1]} × {image.shape[0]} px, the reference {like.shape[1]} × {like.shape[0]}: "
+            "pictures of one test must have one size"
+        )
     if np.ptp(image) == 0:
         raise InputError(f"{what} is blank: every pixel has the grey value {image.flat[0]:g}")
     return np.ascontiguousarray(image, np.float32)
@@ -56,7 +65,7 @@ class Reference:
     def __init__(self, image: np.ndarray, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
         self.image = checked(image, "the reference picture")
-        self.grid = Grid.over(self.image.shape, self.settings)  # type: ignore[arg-type]
+        self.grid = Grid.over(self.image.shape, self.settings)
         self._picture: Any = core().Picture(self.image)
 
     def correlate(self, image: np.ndarray, start: Correlation | None = None) -> Correlation:
@@ -74,9 +83,7 @@ class Reference:
         ConvergenceError
             if nothing of the reference is found again
         """
-        grey = checked(image, "the deformed picture")
-        if grey.shape != self.image.shape:
-            raise InputError(f"the deformed picture is {grey.shape[1]} × {grey.shape[0]} px, the reference {self.image.shape[1]} × {self.image.shape[0]} px")
+        grey = checked(image, "the deformed picture", like=self.image)
         match = Match(core(), self._picture, core().Picture(grey), self.grid, self.settings)
         return matched(match, self.image, grey, start)
 
@@ -90,12 +97,13 @@ def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Cor
     """The whole chain: propagate, learn the noise, cut what one warp does not explain, judge."""
     found = _from_start(match, start) if start is not None else _unreached(match.grid.size)
     drift = np.zeros(2) if start is None or not start.valid.any() else np.median(start.warp[start.valid, :2], axis=0)
-    found = _seeded(match, reference, current, found, drift, 1 if start is not None and _good(match, found).any() else _ROUNDS)
+    rounds = 1 if start is not None and _good(match, found).any() else _ROUNDS
+    found = _seeded(match, reference, current, found, drift, rounds)
     good = _good(match, found)
     if good.sum() < max(3, 0.02 * good.size):
         raise ConvergenceError(
-            f"only {int(good.sum())} of {good.size} points of the reference are found in the picture: the motion may be "
-            f"larger than search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
+            f"only {int(good.sum())} of {good.size} points of the reference are found in the picture: the motion may "
+            f"be larger than search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
         )
     noise = MatchNoise.learnt(found["residual"][good], found["count"][good], found["score"][good])
     sheet = _sheet(match, found, noise)
@@ -108,7 +116,7 @@ def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Cor
 
 def _unreached(n: int) -> dict[str, np.ndarray]:
     widths = {"warp": 6, "level": 2, "covariance": 3, "suspect": 4}
-    found = {name: np.zeros((n, k)) for name, k in widths.items()}
+    found: dict[str, np.ndarray] = {name: np.zeros((n, k)) for name, k in widths.items()}
     found |= {name: np.zeros(n) for name in ("residual", "contrast", "score", "bend")}
     return found | {
         "zncc": np.full(n, -1.0),
@@ -175,9 +183,9 @@ def _seeded(
 def _spots(grid: Grid, missing: np.ndarray) -> np.ndarray:
     """Nodes for seeds in the parts of the grid that are missing: spread over the largest, else the middle of each."""
     if missing.all():
-        rows, columns = (np.unique(np.linspace(0.2, 0.8, 3) * (n - 1)).astype(int) for n in grid.shape)
+        rows, columns = (np.unique((np.linspace(0.2, 0.8, 3) * (n - 1)).astype(int)) for n in grid.shape)
         return np.unique(rows[:, None] * grid.shape[1] + columns)
-    label, count = ndimage.label(missing.reshape(grid.shape), np.ones((3, 3)))
+    label, _ = ndimage.label(missing.reshape(grid.shape), np.ones((3, 3)))
     sizes = np.bincount(label.ravel())[1:]
     large = [k for k in np.argsort(-sizes)[:_SEEDS] if sizes[k] >= 9]
     depth = ndimage.distance_transform_cdt(np.pad(missing.reshape(grid.shape), 1))[1:-1, 1:-1]
@@ -199,7 +207,7 @@ def _search(
         place = find(reference, current, at, half, match.settings.search_px, tuple(drift - carried[:2]))
         if place is not None and place.certain:
             seeds.append(spot)
-            guesses.append(carried + [*place.shift, 0, 0, 0, 0])
+            guesses.append(np.add(carried, (*place.shift, 0, 0, 0, 0)))
     return np.array(seeds, np.int32), np.array(guesses, float).reshape(-1, 6)
 
 
@@ -209,7 +217,10 @@ def _sheet(match: Match, found: dict[str, np.ndarray], noise: MatchNoise) -> She
     status[status == Status.OK] = Status.POOR_MATCH
     empty = {"line": 2, "far": 6, "jump": 2, "jump_std": 2}
     sheet = Sheet(
-        **{k: found[k].copy() for k in ("warp", "zncc", "iterations", "covariance", "level", "suspect", "bend", "count")},
+        **{
+            k: found[k].copy()
+            for k in ("warp", "zncc", "iterations", "covariance", "level", "suspect", "bend", "count")
+        },
         **{k: np.full((n, width), np.nan) for k, width in empty.items()},
         status=status.astype(np.uint8),
         variance=np.full(n, np.inf),

@@ -145,9 +145,7 @@ def _graph(inside: np.ndarray, size: np.ndarray) -> sparse.csr_matrix:
     return graph + graph.T
 
 
-def _directed(
-    nodes: np.ndarray, found: Jumps, raster: Raster, mouth: np.ndarray | None
-) -> tuple[np.ndarray, bool]:
+def _directed(nodes: np.ndarray, found: Jumps, raster: Raster, mouth: np.ndarray | None) -> tuple[np.ndarray, bool]:
     """The nodes from the mouth on, and whether both ends lie on the border."""
     last = np.array(found.size.shape) - 1
     border = [bool(np.any(end < 3) or np.any(end > last - 3)) for end in (nodes[0], nodes[-1])]
@@ -261,8 +259,8 @@ def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float) -> tu
     good = np.isfinite(size) & np.isfinite(std)
     stretch = max(0.4 * arc[-1], 4 * blind)
     use = good & (arc > arc[-1] - blind - stretch) & (arc < arc[-1] - blind)
-    laws = [_vanishing(arc[use], size[use], power) for power in (2, 1)] if use.sum() >= 5 else []
-    laws = [law for law in laws if law is not None]
+    fits = [_vanishing(arc[use], size[use], power) for power in (2, 1)] if use.sum() >= 5 else []
+    laws = [law for law in fits if law is not None]
     if not laws:
         return float(arc[-1]), float(np.hypot(blind, blind))
     laws.sort(key=lambda law: law[2])

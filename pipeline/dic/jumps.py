@@ -134,9 +134,7 @@ def _blur(raster: Raster, found: Jumps) -> int:
     for row, column in zip(*np.unravel_index(strong, found.size.shape), strict=True):
         angle, direction = found.angle[row, column], found.vector[row, column]
         where = [row + at * np.sin(angle), column + at * np.cos(angle)]
-        along = sum(
-            ndimage.map_coordinates(raster.displacement[..., k], where, order=1) * direction[k] for k in (0, 1)
-        )
+        along = sum(ndimage.map_coordinates(raster.displacement[..., k], where, order=1) * direction[k] for k in (0, 1))
         widths.append(_half_width(at, along))
     return int(np.clip(np.ceil(np.median(widths)), 1, _WIDEST)) if widths else 1
 

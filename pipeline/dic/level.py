@@ -78,15 +78,19 @@ class MovedMesh:
         """Material points (n, 2) seen on a square raster, row by row, and whether there is any (n,)."""
         place = np.column_stack([np.tile(columns, rows.size), np.repeat(rows, columns.size)])
         simplices = self.mesh.delaunay.simplices[self.whole].astype(np.int32)
-        number = core().cover(
-            np.ascontiguousarray(self.mesh.points + self.displacement),
-            np.ascontiguousarray(simplices),
-            column0=float(columns[0]),
-            row0=float(rows[0]),
-            step=float(columns[1] - columns[0]),
-            columns=columns.size,
-            rows=rows.size,
-        ).ravel()
+        number = (
+            core()
+            .cover(
+                np.ascontiguousarray(self.mesh.points + self.displacement),
+                np.ascontiguousarray(simplices),
+                column0=float(columns[0]),
+                row0=float(rows[0]),
+                step=float(columns[1] - columns[0]),
+                columns=columns.size,
+                rows=rows.size,
+            )
+            .ravel()
+        )
         origin, seen = np.full(place.shape, np.nan), number >= 0
         origin[seen] = self._in_triangle(simplices[number[seen]], place[seen])
         self._in_pieces(origin, seen, place)

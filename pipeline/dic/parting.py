@@ -190,7 +190,9 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     far = found["far_matched"].astype(bool) & (far_variance <= noise.limit(far_n))
     jump, jump_std = _jumps(found, noise.variance)
     single, parted, swapped = found["cost"].T
-    excess = (sheet.variance[points] / noise.variance - 1) * np.maximum(sheet.count[points], 1)  # not clipped, as the bend is not
+    excess = (sheet.variance[points] / noise.variance - 1) * np.maximum(
+        sheet.count[points], 1
+    )  # not clipped, as the bend is not
     bent = sheet.bend[points] / noise.variance > _BENT * np.maximum(excess, single - parted)
     saves = (single - parted > _GAIN * noise.score) & ~bent
     fits = found["attempted"].astype(bool) & (variance <= noise.limit(near_n))

@@ -70,16 +70,12 @@ def track(
     settings = settings or Settings()
     series = iter(frames)
     first = checked(next(series), "frame 0")
-    grid = Grid.over(first.shape, settings)  # type: ignore[arg-type]
+    grid = Grid.over(first.shape, settings)
     base = _Base(first, core().Picture(first), None)
     before: tuple[np.ndarray, Any, Correlation] | None = None
     sound = 0.0
     for number, frame in enumerate(series, start=1):
-        grey = checked(frame, f"frame {number}")
-        if grey.shape != first.shape:
-            raise InputError(
-                f"frame {number} is {grey.shape[1]} × {grey.shape[0]} px, frame 0 {first.shape[1]} × {first.shape[0]} px"
-            )
+        grey = checked(frame, f"frame {number}", like=first)
         picture = core().Picture(grey)
         start = before[2] if before else None
         result = _against(base, picture, grey, grid, settings, start, number)
