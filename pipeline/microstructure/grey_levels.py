@@ -53,10 +53,11 @@ def valley(values: np.ndarray, threshold: float) -> float:
 
 
 def void_threshold(values: np.ndarray, threshold: float) -> float | None:
-    """Where voids end: halfway between the darker phase and a population clearly darker than it; None without one.
+    """Where voids end: between the darker phase and a population clearly darker than it; None without one.
 
-    Clearly darker: below the phase's median by six of its robust standard deviations, and with at most a
-    quarter as many pixels halfway as around the median of the voids.
+    Clearly darker: below the phase's median by six of its robust standard deviations, with a gap. The
+    threshold lies halfway between the two medians, or somewhat lower (a dark stone may lie halfway), where
+    there are at most a quarter as many pixels as around the median of the voids.
 
     Parameters
     ----------
@@ -72,7 +73,10 @@ def void_threshold(values: np.ndarray, threshold: float) -> float | None:
     if deep.size < 10:
         return None
     void = float(np.median(deep))
-    halfway, band = (void + middle) / 2, 0.1 * (middle - void)
-    between = np.count_nonzero(np.abs(dark - halfway) < band)
+    band = 0.1 * (middle - void)
     around = np.count_nonzero(np.abs(dark - void) < band)
-    return float(halfway) if between <= 0.25 * around else None
+    for share in (0.5, 0.4, 0.3):
+        level = float(void + share * (middle - void))
+        if np.count_nonzero(np.abs(dark - level) < band) <= 0.25 * around:
+            return level
+    return None

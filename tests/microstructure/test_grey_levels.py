@@ -35,7 +35,7 @@ def test_one_population_has_no_valley(shape):
 @pytest.mark.parametrize(("apart", "deepest"), [(3, 0.8), (4, 0.35), (6, 0.05)])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
 def test_two_populations_have_one(apart, deepest, share):
-    """Two equal Gaussians d apart: valley over peak is 2 exp(−d²/8), that is 0.65, 0.27, 0.02; more for unequal ones."""
+    """Two equal Gaussians d apart: valley over peak is 2 exp(−d²/8), 0.65, 0.27, 0.02; more for unequal ones."""
     values = sample((round(40000 * share), 100, 10), (round(40000 * (1 - share)), 100 + 10 * apart, 10))
     assert valley(values, otsu_threshold(values)) < deepest * (1 if share == 0.5 else 1.4)
 
@@ -44,6 +44,11 @@ def test_two_populations_have_one(apart, deepest, share):
 def test_voids_are_parted_halfway(count):
     values = sample((40000, 100, 6), (50000, 180, 6), (count, 10, 4))
     assert void_threshold(values, 140.0) == pytest.approx(55, abs=3)  # medians of 10 and 100
+
+
+def test_a_dark_stone_halfway_does_not_hide_the_voids():
+    values = sample((40000, 60, 5), (50000, 160, 6), (2900, 10, 2), (900, 36, 1))
+    assert 16 < void_threshold(values, 110.0) < 33  # three standard deviations from voids and stone
 
 
 def test_tails_are_no_voids():
