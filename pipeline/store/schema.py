@@ -54,9 +54,9 @@ class Layout:
     def encode(self, values: Mapping[str, Any]) -> bytes:
         """The whole file as bytes, from values by entry name (None: left out).
 
-        Arrays are compressed and carry check sums, as do the file's own structures (libver v110), so that
-        a damaged file is known by reading it. Refuses names that the layout does not have and shapes that
-        do not fit it.
+        Arrays are compressed, and zlib's check sums stand with them as HDF5's own (libver v110) with the
+        file's structures, so that a damaged file is known by reading it. Refuses names that the layout
+        does not have and shapes that do not fit it.
         """
         given = {name: value for name, value in values.items() if value is not None}
         unknown = set(given) - {entry.name for entry in self.entries}
@@ -134,7 +134,7 @@ def _put(file: h5py.File, entry: Entry, value: Any) -> None:
         file.attrs[entry.name] = str(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
         return
     array = np.asarray(value, entry.dtype)
-    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True} if array.size else {}
+    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size else {}
     dataset = file.create_dataset(entry.name, data=array, **(packed if array.ndim else {}))
     dataset.attrs["unit"] = entry.unit
 

@@ -96,12 +96,13 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from pipeline.store import atomic
-atomic.os.fsync = lambda handle: os.kill(os.getpid(), signal.SIGKILL)
+setattr(atomic.os, sys.argv[2], lambda *rest: os.kill(os.getpid(), signal.SIGKILL))
 atomic.write_atomically(Path(sys.argv[1]), b"new" * 1000)
 """
 
 
-def test_a_killed_writer_leaves_the_old_file(tmp_path):
+@pytest.mark.parametrize("step", ["fsync", "replace"])
+def test_a_killed_writer_leaves_the_old_file(tmp_path, step):
     (tmp_path / "x").write_bytes(b"old")
-    assert run(KILLED, tmp_path / "x").returncode == -9
+    assert run(KILLED, tmp_path / "x", step).returncode == -9
     assert (tmp_path / "x").read_bytes() == b"old"

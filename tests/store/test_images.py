@@ -145,8 +145,9 @@ def test_a_png_with_a_changed_bit_is_seen(tmp_path_factory, data):
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= 1 << data.draw(st.integers(0, 7))
     path.write_bytes(content)
-    with pytest.raises(InputError, match=r"^x\.png: "):
-        read_grey(path)
+    for read in (read_grey, image_size):
+        with pytest.raises(InputError, match=r"^x\.png: "):
+            read(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n", b"II*\0\x08\0\0\0", b"\xff\xd8\xff\xe0JFIF"])
