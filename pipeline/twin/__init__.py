@@ -1,0 +1,1 @@
+"""Engine B: virtual fracture tests on an irregular network that shares nothing with the identifying lattice."""

@@ -1,0 +1,187 @@
+"""A virtual fracture test: what machine and camera would record of a specimen whose properties are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import InputError
+from pipeline.core.field import DisplacementField
+from pipeline.core.observation import observe
+from pipeline.core.problem import Problem, Solution
+from pipeline.core.specimen import Specimen
+from pipeline.core.units import MM
+from pipeline.materials.mixture import Mixture
+from pipeline.twin.calibration import calibrated_factors
+from pipeline.twin.network import irregular_network
+from pipeline.twin.problem import Factors, PhaseAt, Truth, twin_problem
+
+PARTED = 0.1  # of delta_max: a bond opened farther no longer joins two crack flanks
+
+Solve = Callable[[Problem], Solution]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """How a virtual test is recorded.
+
+    Parameters
+    ----------
+    cmod_rate : float, m/s
+    cmod_max : float, m; end of the test
+    frames : int; images, at equal times from the unloaded specimen to the end
+    sampling : float, 1/s; rows of the load record per second
+    grid_step : float, m; distance of measured points
+    roi : float, m; side of the square around the notch tip in which displacements are measured
+    displacement_std : float, m; white noise of one displacement component
+    load_std : float, N; white noise of the load
+    cmod_std : float, m; white noise of the clip gauge
+    """
+
+    cmod_rate: float
+    cmod_max: float
+    frames: int = 61
+    sampling: float = 5.0
+    grid_step: float = 1.5 * MM
+    roi: float = 45 * MM
+    displacement_std: float = 0.0
+    load_std: float = 0.0
+    cmod_std: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive = {"cmod_rate": "m/s", "cmod_max": "m", "sampling": "1/s", "grid_step": "m", "roi": "m"}
+        for name, unit in positive.items():
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} = {getattr(self, name):g} {unit} of a virtual test must be positive")
+        for name, unit in {"displacement_std": "m", "load_std": "N", "cmod_std": "m"}.items():
+            if not getattr(self, name) >= 0:
+                raise InputError(f"{name} = {getattr(self, name):g} {unit} of a virtual test must not be negative")
+        if self.frames < 3:
+            raise InputError(f"{self.frames} frames: a virtual test needs at least 3")
+
+    @property
+    def frame_time(self) -> np.ndarray:
+        """(frames,) array, s."""
+        return np.linspace(0.0, self.cmod_max / self.cmod_rate, self.frames)
+
+
+@dataclass(frozen=True)
+class VirtualTest:
+    """The recorded test, and what no identifying program may see.
+
+    Parameters
+    ----------
+    curve : LoadCurve with noise
+    field : DisplacementField with noise, counted by time, from the unloaded state
+    exact_curve, exact_field : the same without noise
+    factors : Factors of the network
+    pitch : float, m
+    particles, bonds : int
+    solution : Solution of the engine
+    """
+
+    curve: LoadCurve
+    field: DisplacementField
+    exact_curve: LoadCurve
+    exact_field: DisplacementField
+    factors: Factors
+    pitch: float
+    particles: int
+    bonds: int
+    solution: Solution
+
+
+def virtual_test(
+    specimen: Specimen,
+    phase_at: PhaseAt,
+    mixture: Mixture,
+    truth: Truth,
+    recording: Recording,
+    pitch: float,
+    rng: np.random.Generator,
+    solve: Solve,
+    factors: Factors | None = None,
+) -> VirtualTest:
+    """Make a network, break it and record it.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    phase_at : points (n, 2) in m → phase and stone number, as `PhaseMap.at`
+    mixture : Mixture; moduli and ratios
+    truth : Truth; f_max and delta_max as the identifying lattice counts them
+    recording : Recording
+    pitch : float, m; of the irregular network
+    rng : numpy Generator; network and noise come from it
+    solve : engine, Problem → Solution
+    factors : Factors; those of `twin.calibration` where not given
+    """
+    factors = calibrated_factors() if factors is None else factors
+    of_network, of_noise = rng.spawn(2)
+    network = irregular_network(specimen, pitch, of_network)
+    stations = recording.frame_time[1:] * recording.cmod_rate
+    problem = twin_problem(
+        specimen, network, phase_at, mixture, truth, factors, recording.cmod_max * (1 + 1e-6), stations
+    )
+    problem = replace(problem, cmod_rate=recording.cmod_rate)
+    solution = solve(problem)
+    curve = _record(solution.curve, recording)
+    field = _film(problem, solution, recording)
+    return VirtualTest(
+        curve=_noisy_curve(curve, recording, of_noise),
+        field=_noisy_field(field, recording, of_noise),
+        exact_curve=curve,
+        exact_field=field,
+        factors=factors,
+        pitch=pitch,
+        particles=problem.particles.count,
+        bonds=problem.bonds.count,
+        solution=solution,
+    )
+
+
+def measuring_points(specimen: Specimen, recording: Recording) -> np.ndarray:
+    """The regular grid (p, 2), m, around the notch tip, without points outside or on the notch line."""
+    half = int(recording.roi / recording.grid_step / 2)
+    steps = np.arange(-half, half + 1) * recording.grid_step
+    x, y = np.meshgrid(steps + specimen.tip[0], steps + specimen.tip[1])
+    points = np.column_stack([x.ravel(), y.ravel()])
+    on_notch = (np.abs(points[:, 0]) < recording.grid_step / 2) & (points[:, 1] < specimen.tip[1])
+    return points[specimen.contains(points) & ~on_notch]
+
+
+def _record(curve: LoadCurve, recording: Recording) -> LoadCurve:
+    """The exact curve at the rows of the load record, the CMOD growing at its constant rate."""
+    time = np.arange(int(recording.cmod_max / recording.cmod_rate * recording.sampling) + 1) / recording.sampling
+    cmod = time * recording.cmod_rate
+    line = np.full(cmod.size, np.nan) if curve.load_line is None else np.interp(cmod, curve.cmod, curve.load_line)
+    return LoadCurve(time=time, cmod=cmod, load=np.interp(cmod, curve.cmod, curve.load), load_line=line)
+
+
+def _film(problem: Problem, solution: Solution, recording: Recording) -> DisplacementField:
+    """Displacements of the measuring points in every frame, the first that of the unloaded specimen."""
+    points = measuring_points(problem.specimen, recording)
+    parted = PARTED * problem.law.delta_max
+    values, valid = observe(problem.particles, problem.bonds, solution.displacement, points, parted)
+    values = np.concatenate([np.zeros((1, len(points), 2)), np.where(valid[..., None], values, np.nan)])
+    valid = np.concatenate([valid[:1], valid])
+    time = recording.frame_time[: len(values)]
+    return DisplacementField(points, values, valid, np.full(valid.shape, recording.displacement_std), time)
+
+
+def _noisy_curve(curve: LoadCurve, recording: Recording, rng: np.random.Generator) -> LoadCurve:
+    size = curve.load.size
+    return replace(
+        curve,
+        cmod=curve.cmod + recording.cmod_std * rng.standard_normal(size),
+        load=curve.load + recording.load_std * rng.standard_normal(size),
+        load_std=np.full(size, recording.load_std),
+    )
+
+
+def _noisy_field(field: DisplacementField, recording: Recording, rng: np.random.Generator) -> DisplacementField:
+    noise = recording.displacement_std * rng.standard_normal(field.displacement.shape)
+    return replace(field, displacement=field.displacement + noise)
