@@ -203,7 +203,7 @@ def virtual_test(
     effect: Effect = None,
     images: Annotated[bool, option("--images", help="Speckle images instead of displacement fields.")] = False,
     noise_px: NoisePx = 0.01,
-    load_noise_n: LoadNoise = 0.0,
+    load_noise_n: LoadNoise = 5.0,
     config: Config = None,
     workers: Workers = None,
     seed: Seed = None,

@@ -1,0 +1,205 @@
+"""A bundle with known truth, broken by another kind of model than the one that identifies."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline import __version__
+from pipeline.config import RunSettings
+from pipeline.core.errors import InputError
+from pipeline.core.particles import Phase
+from pipeline.core.specimen import Specimen
+from pipeline.core.units import MM
+from pipeline.equilibrium.solve import solve as find_equilibria
+from pipeline.execution.progress import Progress, Silent
+from pipeline.microstructure.gradation import fuller_section
+from pipeline.store.atomic import write_atomically
+from pipeline.store.bundle import Bundle, read_bundle
+from pipeline.store.experiment import Experiment
+from pipeline.store.images import read_grey, read_labels
+from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
+from pipeline.store.results import plain
+from pipeline.study.model import grey_levels, mixture, read_phases, settings_of
+from pipeline.twin.problem import Truth, one_phase
+from pipeline.twin.virtual_test import Recording, VirtualTest
+from pipeline.twin.virtual_test import virtual_test as break_network
+
+SPREAD = 0.12  # the truth lies within ± this share of the start, unless it is given
+PITCH = 1.9  # of the network, in particle radii: no lattice of the identifying side has it
+SECTION_MM_PER_PX, SECTION_MARGIN_PX = 0.1, 5  # of a synthetic section
+CAMERA_MM_PER_PX = 0.0439  # Hill et al. 2017, table 1
+CMOD_MAX_MM = {"seb": 0.6, "dct": 0.65}  # beyond the paper's last station
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a virtual test is asked to be; None is left to chance or to the default.
+
+    Parameters
+    ----------
+    geometry : "seb" or "dct"
+    specimen : image of the specimen, photograph or labels
+    mm_per_px : float; scale of `specimen`, its lower edge at the mouth and its middle on the notch line
+    like : bundle whose specimen, material and settings are taken over
+    f_max, delta_max : the truth, N per bond of the bundle's lattice and m
+    start : (N, m) in the bundle's [start]
+    radius_mm : of the bundle's lattice
+    noise_px, load_noise_n : standard deviations of displacement and load
+    """
+
+    geometry: str | None = None
+    specimen: Path | None = None
+    mm_per_px: float | None = None
+    like: Path | None = None
+    f_max: float | None = None
+    delta_max: float | None = None
+    start: tuple[float, float] | None = None
+    radius_mm: float | None = None
+    noise_px: float = 0.01
+    load_noise_n: float = 5.0
+
+
+def virtual_test(
+    out: Path, *, config: Path | None = None, seed: int | None = None, progress: Progress | None = None, **asked: Any
+) -> str:
+    """Make a bundle of a virtual test in OUT; the truth goes to OUT/truth.json, which no other command reads.
+
+    Parameters
+    ----------
+    out : folder that does not hold a bundle yet
+    seed : of section, network, truth and noise
+    asked : fields of `Request`
+    """
+    settings = settings_of(config, seed=seed)
+    request, progress = Request(**asked), progress or Silent()
+    of_section, of_truth, of_test = np.random.default_rng(settings.seed).spawn(3)
+    progress.stage("drawing the specimen")
+    experiment, images = prepare(request, out.resolve().name, of_section)
+    write_bundle(out, experiment, images)
+    bundle = read_bundle(out)
+    truth = draw_truth(request, bundle, of_truth)
+    progress.stage("breaking it")
+    test = run_test(bundle, truth, request, of_test)
+    noise = {"displacement_std_mm": request.noise_px * CAMERA_MM_PER_PX, "load_std_n": request.load_noise_n}
+    noted = {name: float(f"{value:.4g}") for name, value in noise.items() if value > 0}
+    section = experiment.noise.model_copy(update=noted)
+    finished = experiment.model_copy(update={"noise": section})
+    filled = Contents(test.curve, test.field)
+    write_bundle(out, finished, filled)
+    write_atomically(out / "truth.json", _truth_text(test, truth, request, settings, bundle))
+    cmod, load = test.curve.peak()
+    return f"virtual test of {test.particles} points and {test.bonds} bonds: peak {load:.0f} N at {cmod / MM:.3f} mm"
+
+
+def prepare(request: Request, name: str, rng: np.random.Generator) -> tuple[Experiment, Contents]:
+    """Settings and specimen image of the bundle, before anything is broken."""
+    if request.like is not None:
+        experiment, images = imitate(read_bundle(request.like))
+    else:
+        geometry = request.geometry or "seb"
+        experiment, images = first_experiment(geometry, name), Contents()
+        loading = experiment.loading.model_copy(update={"cmod_max_mm": CMOD_MAX_MM[geometry]})
+        experiment = experiment.model_copy(update={"loading": loading})
+    experiment = at_radius(experiment, request)
+    if request.specimen is not None:
+        return with_image(experiment, request)
+    if request.like is None:
+        return with_section(experiment, rng)
+    return experiment, images
+
+
+def imitate(bundle: Bundle) -> tuple[Experiment, Contents]:
+    """The settings of a bundle and its specimen's image."""
+    if bundle.labels is not None:
+        return bundle.experiment, Contents(labels=read_labels(bundle.labels))
+    if bundle.specimen_image is not None:
+        return bundle.experiment, Contents(photograph=grey_levels(read_grey(bundle.specimen_image)))
+    return bundle.experiment, Contents()
+
+
+def at_radius(experiment: Experiment, request: Request) -> Experiment:
+    """The settings at the particle radius and start that are asked for."""
+    radius = request.radius_mm or experiment.model.particle_radius_mm
+    thickness = experiment.specimen.thickness_mm
+    f_max, delta_max = request.start or (START_F_MAX * (radius / 0.3) * (thickness / 40.0), START_DELTA_MAX)
+    model = experiment.model.model_copy(update={"particle_radius_mm": radius})
+    start = {"f_max_n": float(f"{f_max:.6g}"), "delta_max_m": delta_max}
+    raw = experiment.model_copy(update={"model": model}).model_dump(exclude_none=True) | {"start": start}
+    return Experiment.model_validate(raw)
+
+
+def with_image(experiment: Experiment, request: Request) -> tuple[Experiment, Contents]:
+    """The specimen's image, its bottom edge at the mouth and its middle column on the notch line."""
+    assert request.specimen is not None
+    if request.mm_per_px is None:
+        raise InputError("--specimen needs --mm-per-px, the scale of the image")
+    image = grey_levels(read_grey(request.specimen))
+    is_label = image.max() <= Phase.VOID
+    frame = {"mm_per_px": request.mm_per_px, "origin_px": [(image.shape[1] - 1) / 2, image.shape[0] - 0.5]}
+    contents = Contents(labels=image) if is_label else Contents(photograph=image)
+    return _with_frame(experiment, frame), contents
+
+
+def with_section(experiment: Experiment, rng: np.random.Generator) -> tuple[Experiment, Contents]:
+    """A graded section drawn by chance, as label image."""
+    specimen: Specimen = experiment.specimen.specimen()
+    x0, y0, x1, y1 = specimen.bounds
+    pitch, margin = SECTION_MM_PER_PX * MM, SECTION_MARGIN_PX
+    columns, rows = (round(size / pitch) + 1 + 2 * margin for size in (x1 - x0, y1 - y0))
+    section = fuller_section(columns * pitch, rows * pitch, pitch, rng)
+    frame = {
+        "mm_per_px": SECTION_MM_PER_PX,
+        "origin_px": [margin - float(f"{x0 / pitch:.9g}"), rows - 1 - margin + float(f"{y0 / pitch:.9g}")],
+    }
+    return _with_frame(experiment, frame), Contents(labels=section.label)
+
+
+def _with_frame(experiment: Experiment, frame: dict[str, Any]) -> Experiment:
+    raw = experiment.model_dump(exclude_none=True)
+    raw["specimen"]["image"] = frame
+    return Experiment.model_validate(raw)
+
+
+def draw_truth(request: Request, bundle: Bundle, rng: np.random.Generator) -> Truth:
+    """The truth that is asked for, or one near the start."""
+    assert bundle.start is not None
+    share = rng.uniform(1 - SPREAD, 1 + SPREAD, 2)
+    f_max = request.f_max or bundle.start.f_max_n * share[0]
+    delta_max = request.delta_max or bundle.start.delta_max_m * share[1]
+    return Truth(float(f_max), float(delta_max), bundle.model.radius)
+
+
+def run_test(bundle: Bundle, truth: Truth, request: Request, rng: np.random.Generator) -> VirtualTest:
+    """Break an irregular network that stands for the bundle's specimen."""
+    phase_map, _ = read_phases(bundle)
+    recording = Recording(
+        cmod_rate=bundle.loading.cmod_rate,
+        cmod_max=bundle.loading.cmod_max or CMOD_MAX_MM[bundle.specimen.geometry] * MM,
+        displacement_std=request.noise_px * CAMERA_MM_PER_PX * MM,
+        load_std=request.load_noise_n,
+    )
+    phase_at = one_phase if phase_map is None else phase_map.at
+    pitch = PITCH * bundle.model.radius
+    return break_network(bundle.specimen, phase_at, mixture(bundle), truth, recording, pitch, rng, find_equilibria)
+
+
+def _truth_text(test: VirtualTest, truth: Truth, request: Request, settings: RunSettings, bundle: Bundle) -> bytes:
+    """truth.json: what was put in, and how the network stands for it."""
+    known = {
+        "version": __version__,
+        "f_max_n": truth.f_max,
+        "delta_max_m": truth.delta_max,
+        "radius_mm": truth.radius / MM,
+        "bond_fracture_energy_j_per_m2": truth.f_max * truth.delta_max / (2 * truth.radius * bundle.specimen.thickness),
+        "seed": settings.seed,
+        "network": {"pitch_mm": test.pitch / MM, "points": test.particles, "bonds": test.bonds},
+        "factors": vars(test.factors),
+        "noise": {"displacement_px": request.noise_px, "mm_per_px": CAMERA_MM_PER_PX, "load_n": request.load_noise_n},
+        "energy_error": test.solution.energy.error,
+    }
+    return (json.dumps(plain(known), indent=2, sort_keys=True) + "\n").encode()
