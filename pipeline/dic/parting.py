@@ -23,7 +23,7 @@ _GAIN = 36.0  # χ² that a cut must save: 1 in 1000 under white noise, for six 
 _BENT = 0.75  # share of the saving from which second-order terms explain it; they explain at most 0.55 of a step
 _SIDE = 25.0  # χ² by which the centre's side must be preferred
 _CLOSE_PX = 1.0  # nearer to the centre than this a line is not located by its pixels, which the gap has blurred …
-_CLOSE_SIDE = 150.0  # … unless χ² speaks so clearly
+_CLOSE_SIDE = 200.0  # … unless χ² speaks so clearly
 _HARMLESS_PX = 0.05  # a jump so small may be put on the wrong side
 
 
@@ -74,6 +74,9 @@ def part(match: Match, sheet: Sheet, noise: MatchNoise) -> None:
         chosen = _neighbours(match, sheet, open_points)
         news = np.any(chosen != tried[open_points], axis=1) & np.any(chosen >= 0, axis=1)
         open_points, chosen = open_points[news], chosen[news]
+        gone = _leaves(match, sheet, open_points, chosen)
+        sheet.status[open_points[gone]] = Status.OUTSIDE
+        open_points, chosen = open_points[~gone], chosen[~gone]
         if not open_points.size:
             return
         tried[open_points] = chosen
@@ -105,6 +108,17 @@ def _extrapolated(match: Match, sheet: Sheet, to: np.ndarray, source: np.ndarray
     warp[..., 0] -= warp[..., 2] * arm[..., 0] + warp[..., 3] * arm[..., 1]
     warp[..., 1] -= warp[..., 4] * arm[..., 0] + warp[..., 5] * arm[..., 1]
     return np.concatenate([warp, sheet.level[source], arm], axis=-1)
+
+
+def _leaves(match: Match, sheet: Sheet, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Which subsets are carried over the border of the picture by every motion around; (len(points),) bool."""
+    moved = (
+        match.grid.points[points][:, None]
+        + _extrapolated(match, sheet, points[:, None], np.maximum(chosen, 0))[..., :2]
+    )
+    last = np.array(match.current.shape[::-1]) - 1 - match.settings.half
+    outside = np.any((moved < match.settings.half) | (moved > last), axis=2)
+    return np.all(outside | (chosen < 0), axis=1)
 
 
 def _try_whole(match: Match, sheet: Sheet, noise: MatchNoise, points: np.ndarray, chosen: np.ndarray) -> None:
