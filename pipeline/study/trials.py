@@ -1,0 +1,102 @@
+"""Trials of the whole chain against known truth, as tables for the documentation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.execution.progress import Progress
+from pipeline.store.results import read_result
+from pipeline.study.identify import identify
+from pipeline.study.virtual_test import virtual_test
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One virtual test identified.
+
+    Parameters
+    ----------
+    name : str
+    f_max, delta_max, energy : float; estimate over truth
+    inside_f, inside_delta : bool; whether the 95 % interval holds the truth
+    interior : bool
+    peak_mismatch : float; simulated over measured peak load, minus one
+    seconds : float; of the identification
+    """
+
+    name: str
+    f_max: float
+    delta_max: float
+    energy: float
+    inside_f: bool
+    inside_delta: bool
+    interior: bool
+    peak_mismatch: float
+    seconds: float
+
+
+def twin_trial(folder: Path, seed: int, objective: str, progress: Progress | None = None, **how: Any) -> Trial:
+    """Make the virtual test of a seed, unless it is there, and identify it.
+
+    Parameters
+    ----------
+    folder : where bundles and results are kept; a second call goes on from there
+    seed : of section, network, truth and noise
+    objective : as of `identify`
+    how : radius_mm and others of `virtual_test`
+    """
+    bundle, out = folder / f"twin-{seed}", folder / f"identified-{seed}"
+    if not (bundle / "truth.json").is_file():
+        virtual_test(bundle, seed=seed, progress=progress, **how)
+    identify(bundle, out, objective=objective, progress=progress)
+    return compare(f"seed {seed}", json.loads((bundle / "truth.json").read_text("utf-8")), read_result(out))
+
+
+def compare(name: str, truth: dict[str, Any], result: dict[str, Any]) -> Trial:
+    """An identification against the truth."""
+    f_max, delta_max = result["f_max_n"] / truth["f_max_n"], result["delta_max_m"] / truth["delta_max_m"]
+    interval = result["interval_95"] or {"f_max_n": (np.nan, np.nan), "delta_max_m": (np.nan, np.nan)}
+    inside = {key: bool(low <= truth[key] <= high) for key, (low, high) in interval.items()}
+    return Trial(
+        name,
+        f_max,
+        delta_max,
+        f_max * delta_max,
+        inside["f_max_n"],
+        inside["delta_max_m"],
+        result["interior"],
+        result["peak_load_mismatch"],
+        result["seconds"],
+    )
+
+
+def trial_table(trials: Sequence[Trial]) -> str:
+    """Trials as a Markdown table, the medians and the worst at its foot."""
+    head = "| test | f_max | delta_max | G_f | truth in interval (f_max, delta_max) | peak load | seconds |"
+    rows = [head, "|---|---|---|---|---|---|---|"]
+    for t in trials:
+        inside = f"{_yes(t.inside_f)}, {_yes(t.inside_delta)}"
+        rows.append(
+            f"| {t.name} | {_off(t.f_max)} | {_off(t.delta_max)} | {_off(t.energy)} | {inside} | "
+            f"{t.peak_mismatch:+.1%} | {t.seconds:.0f} |"
+        )
+    ratios = np.array([(t.f_max, t.delta_max, t.energy) for t in trials])
+    for name, of in (("median", np.median), ("worst", lambda r, axis: r[np.argmax(np.abs(r - 1), axis), range(3)])):
+        rows.append(f"| **{name}** | " + " | ".join(_off(v) for v in of(ratios, axis=0)) + " | | | |")
+    inside_f, inside_d = (sum(getattr(t, k) for t in trials) for k in ("inside_f", "inside_delta"))
+    rows.append(f"| **truth inside** | {inside_f} of {len(trials)} | {inside_d} of {len(trials)} | | | | |")
+    return "\n".join(rows) + "\n"
+
+
+def _off(ratio: float) -> str:
+    return f"{ratio - 1:+.1%}"
+
+
+def _yes(inside: bool) -> str:
+    return "yes" if inside else "no"
