@@ -11,7 +11,7 @@ from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.dic.core import core
 from pipeline.dic.correlation import Correlation
 from pipeline.dic.grid import Grid
-from pipeline.dic.noise import MatchNoise
+from pipeline.dic.noise import MatchNoise, deviation
 from pipeline.dic.parting import Match, Sheet, adopt, part
 from pipeline.dic.seeds import find
 from pipeline.dic.settings import Settings
@@ -239,7 +239,7 @@ def _accept_whole(sheet: Sheet, found: dict[str, np.ndarray], good: np.ndarray, 
 
 def _correlation(match: Match, sheet: Sheet, noise: MatchNoise) -> Correlation:
     variance = np.where(np.isfinite(sheet.variance), np.maximum(sheet.variance, noise.variance), np.nan)
-    std = np.sqrt(np.maximum(sheet.covariance[:, :2], 0) * variance[:, None])
+    std = deviation(sheet.covariance[:, :2], sheet.count, variance)
     status = sheet.status.copy()
     status[sheet.sound & ~(std.max(axis=1) <= match.settings.imprecise_px)] = Status.NO_CONTRAST
     return Correlation(

@@ -13,6 +13,25 @@ _SCORE_REFUSE = 34.0  # exceeded by 1 in 10⁵
 _SIGMAS = 6.0
 
 
+_GRADIENT_NOISE = 1.3923  # variance of a cubic spline's slope at the pixels under white noise of variance 1
+
+
+def deviation(covariance: np.ndarray, count: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Standard deviations (n, 2) of u and v, px.
+
+    The Cramér–Rao bound σ √(H⁻¹), with H from gradients that are noisy themselves: noise adds to H what does not
+    help, and the estimate scatters as if that share were missing (errors in variables; Fuller 1987, ch. 1).
+
+    Parameters
+    ----------
+    covariance : (n, 2) array, 1/(grey/px)²; diagonal of H⁻¹
+    count : (n,) array; pixels
+    variance : (n,) array, grey²; of reference minus matched grey value, half of it from the reference
+    """
+    wasted = _GRADIENT_NOISE * 0.5 * (variance * count)[:, None] * covariance
+    return np.sqrt(np.maximum(covariance, 0) * variance[:, None]) / np.maximum(1 - wasted, 0.1)
+
+
 @dataclass(frozen=True)
 class MatchNoise:
     """The scatter of matched grey values in sound subsets.

