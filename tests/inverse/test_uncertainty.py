@@ -50,9 +50,9 @@ def test_correlated_discrepancy_of_known_size_is_covered(objective):
 
 @pytest.mark.parametrize("objective", [Objective.FIELDS, Objective.BOTH])
 def test_correlated_discrepancy_of_unknown_size_is_covered(objective):
-    found = coverage(both_errors, objective, Discrepancy())
+    found = coverage(both_errors, objective, Discrepancy(), draws=150)
     # the flat prior and Satterthwaite's t are approximations on the wide side
-    assert np.all((found > 0.912) & (found < 0.998))
+    assert np.all((found > 0.896) & (found <= 1))  # 95 % less 3 standard errors of 150 draws; above is allowed
 
 
 def test_noise_alone_is_a_lower_bound_that_does_not_cover():
