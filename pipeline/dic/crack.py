@@ -13,6 +13,7 @@ from pipeline.dic.jumps import Jumps, Raster, jumps
 
 _STANDS_OUT = 8.0  # a ridge begins this many robust deviations above the field's own scatter of steps
 _SHARE = 0.05  # … and at this share of the largest step
+_BRIDGE = 7  # nodes; gaps in a crest that are bridged
 _LEAST = 12  # nodes along a ridge that count as a crack
 
 
@@ -100,18 +101,17 @@ def _ridge(found: Jumps) -> np.ndarray:
     middle = float(np.median(size))
     scatter = 1.4826 * float(np.median(np.abs(size - middle)))
     mask = size > max(middle + _STANDS_OUT * scatter, _SHARE * float(np.quantile(size, 0.999)))
-    label, count = ndimage.label(mask & _crest(found), np.ones((3, 3)))
-    label, count = ndimage.label(ndimage.binary_dilation(label > 0, np.ones((3, 3))) & mask, np.ones((3, 3)))
+    crest = mask & _crest(found)
+    label, count = ndimage.label(ndimage.binary_dilation(crest, np.ones((_BRIDGE, _BRIDGE))) & mask, np.ones((3, 3)))
     if not count:
         raise ConvergenceError("no crack stands out of the noise of the field")
-    weight = ndimage.sum_labels(size, label, np.arange(1, count + 1))
+    weight = ndimage.sum_labels(np.where(crest, size, 0), label, np.arange(1, count + 1))
     inside = np.argwhere(label == int(np.argmax(weight)) + 1)
-    graph = _graph(inside, size)
-    start = 0
-    for _ in range(3):
+    graph, ends = _graph(inside, size), crest[inside[:, 0], inside[:, 1]]
+    start = last = int(np.argmax(ends))
+    for _ in range(3):  # from end to end: the farthest crest, and the one farthest from that
         far, previous = csgraph.dijkstra(graph, indices=start, return_predecessors=True)
-        start, last = int(np.argmax(np.where(np.isfinite(far), far, -1))), start
-    way = [last]  # back along the predecessors of the last sweep, which began at `last`
+        start, last = int(np.argmax(np.where(np.isfinite(far) & ends, far, -1))), start
     node = start
     back = [node]
     while node != last:
@@ -218,9 +218,13 @@ def _profile(raster: Raster, nodes: np.ndarray, blind: int, through: bool) -> Cr
     steps = [_two_planes(place[i] - p, value[i], n, blind * raster.step) for p, n, i in
              zip(path, normal, tree.query_ball_point(path, reach), strict=True)]  # fmt: skip
     jump, std = np.array([s[0] for s in steps]), np.array([s[1] for s in steps])
+    if np.mean([s[2] for s in steps]) < 0.5:
+        raise ConvergenceError("no crack stands out: where the field is steepest it is bent, not torn")
     arc = np.arange(len(path)) * raster.step
     opening, sliding = np.sum(jump * normal, axis=1), np.sum(jump * tangent, axis=1)
-    end, end_std = (float(arc[-1]), 0.0) if through else _tip(arc, np.hypot(opening, sliding), std, blind * raster.step)
+    end, end_std = (
+        (float(arc[-1]), 0.0) if through else _tip(arc, np.hypot(opening, sliding), std, blind * raster.step, reach)
+    )
     keep = arc <= end
     tip = np.array([np.interp(end, arc, path[:, k]) for k in (0, 1)])
     if end > arc[-1]:
@@ -235,21 +239,26 @@ def _profile(raster: Raster, nodes: np.ndarray, blind: int, through: bool) -> Cr
     return Crack(closing=closing, tip=tip, tip_std=end_std, through=through, **pieces)
 
 
-def _two_planes(arm: np.ndarray, value: np.ndarray, normal: np.ndarray, blind: float) -> tuple[np.ndarray, float]:
-    """Step (2,) between planes fitted to the two flanks, and its standard deviation."""
+def _two_planes(arm: np.ndarray, value: np.ndarray, normal: np.ndarray, blind: float) -> tuple[np.ndarray, float, bool]:
+    """Step (2,) between planes fitted to the two flanks, its standard deviation, and whether they fit better than
+    one smooth surface of third order."""
     across = arm @ normal
     use = np.abs(across) >= 0.99 * blind
     side = np.sign(across[use])
     basis = np.column_stack([np.ones(use.sum()), arm[use], 0.5 * side, arm[use] * side[:, None]])
     if min((side > 0).sum(), (side < 0).sum()) < 6 or np.linalg.matrix_rank(basis) < 6:
-        return np.full(2, np.nan), np.nan
+        return np.full(2, np.nan), np.nan, True
     solution, *_ = np.linalg.lstsq(basis, value[use], rcond=None)
     left = value[use] - basis @ solution
     variance = np.sum(left**2) / (2 * max(len(left) - 6, 1))
-    return solution[3], float(np.sqrt(variance * np.linalg.inv(basis.T @ basis)[3, 3]))
+    x, y = (arm[use] / np.abs(arm).max()).T
+    smooth = np.column_stack([x**i * y**j for i in range(4) for j in range(4 - i)])
+    bent = value[use] - smooth @ np.linalg.lstsq(smooth, value[use], rcond=None)[0]
+    torn = np.sum(left**2) / (len(left) - 6) < np.sum(bent**2) / max(len(left) - 10, 1)
+    return solution[3], float(np.sqrt(variance * np.linalg.inv(basis.T @ basis)[3, 3])), bool(torn)
 
 
-def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float) -> tuple[float, float]:
+def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float, reach: float) -> tuple[float, float]:
     """Where the step would vanish, with its standard deviation.
 
     Near a sharp tip the square of the step is linear in the distance (Irwin 1957), at a hinge the step itself; the law
@@ -257,8 +266,8 @@ def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float) -> tu
     out, in it the flanks' windows reach around the tip.
     """
     good = np.isfinite(size) & np.isfinite(std)
-    stretch = max(0.4 * arc[-1], 4 * blind)
-    use = good & (arc > arc[-1] - blind - stretch) & (arc < arc[-1] - blind)
+    stretch = max(0.4 * arc[-1], 2 * reach)
+    use = good & (arc > arc[-1] - reach - stretch) & (arc < arc[-1] - reach)
     fits = [_vanishing(arc[use], size[use], power) for power in (2, 1)] if use.sum() >= 5 else []
     laws = [law for law in fits if law is not None]
     if not laws:
@@ -267,7 +276,7 @@ def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float) -> tu
     end, spread, left = laws[0]
     if len(laws) == 2 and laws[1][2] < 1.5 * left:
         spread = float(np.hypot(spread, 0.5 * (laws[1][0] - end)))
-    return float(np.clip(end, arc[0], arc[-1] + 2 * blind)), float(np.hypot(spread, 0.5 * blind))
+    return float(np.clip(end, arc[0], arc[-1] + 3 * reach)), float(np.hypot(spread, 0.5 * blind))
 
 
 def _vanishing(arc: np.ndarray, size: np.ndarray, power: int) -> tuple[float, float, float] | None:

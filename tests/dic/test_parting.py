@@ -62,12 +62,15 @@ def test_any_angle_with_sliding_and_strain(angle, one_core):
     found = count(result, pair)
     assert found.valid[0] / found.points[0] > 0.8  # a twelfth lies within 1 px of the line and cannot be told
     assert found.wrong.sum() <= 0.01 * found.valid[0]  # goal
-    cut_points = result.split & np.isfinite(result.opening)
-    assert np.median(result.opening[cut_points]) == pytest.approx(3.0, abs=0.05)  # median of over 100 jumps
-    across = (result.points[cut_points] - [125, 125]) @ [-np.sin(angle), np.cos(angle)]
-    sliding = np.median(result.sliding[cut_points] * -np.sign(across))
-    # along the line, seen from the near side, the far one slides by ξ when the normal is −η: sign by the side
-    assert abs(sliding) == pytest.approx(1.5, abs=0.05)
+    parted = result.split & np.isfinite(result.opening)
+    along, normal = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    above = np.sign((result.points[parted] - [125, 125]) @ normal)
+    jump = np.median(-above[:, None] * result.jump[parted], axis=0)
+    assert jump @ normal == pytest.approx(3.0, abs=0.05)  # median of over 100 jumps
+    assert jump @ along == pytest.approx(-1.5, abs=0.05)  # as above
+    assert np.median(result.opening[parted]) == pytest.approx(3.0, abs=0.1)  # the line may be tilted by 0.03
+    # seen from either side the far one slides by +1.5 towards a quarter turn on from the normal
+    assert np.median(result.sliding[parted]) == pytest.approx(1.5, abs=0.25)  # 3 px × tilt, and its bias
 
 
 @pytest.mark.parametrize("seed", [1, 4, 8, 12])
@@ -86,7 +89,7 @@ def test_two_cracks_in_one_subset_are_failed_not_wrong(distance, one_core):
     between = np.abs(result.points[:, 0] - 109.75) < distance / 2
     assert between.sum() > 20
     assert not result.valid[between].any()
-    assert set(result.status[between]) <= {Status.TWO_CRACKS, Status.POOR_MATCH, Status.ON_CRACK}
+    assert set(result.status[between]) <= {Status.TWO_CRACKS, Status.POOR_MATCH, Status.ON_CRACK, Status.OUTSIDE}
     assert count(result, pair).wrong.sum() == 0
 
 

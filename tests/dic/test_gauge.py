@@ -1,0 +1,38 @@
+"""The opening across the notch."""
+
+import numpy as np
+import pytest
+
+from pipeline.core.errors import InputError
+from pipeline.core.field import DisplacementField
+from pipeline.dic.gauge import opening
+
+X, Y = np.meshgrid(np.linspace(-10e-3, 10e-3, 41), np.linspace(0, 10e-3, 21))
+POINTS = np.column_stack([X.ravel(), Y.ravel()])
+
+
+def field(noise=0.0, seed=0):
+    moved = []
+    for step in (0.0, 20e-6, 50e-6):
+        side = np.sign(POINTS[:, :1])
+        moved.append(side * [[step / 2, 0]] + POINTS * [1e-3, -2e-4] + [3e-6, 0])
+    moved = np.array(moved) + np.random.default_rng(seed).normal(0, noise, (3, len(POINTS), 2))
+    ok = np.ones((3, len(POINTS)), bool)
+    return DisplacementField(POINTS, moved, ok, np.full(ok.shape, noise), np.arange(3.0))
+
+
+def test_jump_and_stretch_between_the_feet():
+    seen, _ = opening(field(), np.array([-2e-3, 1e-3]), np.array([2e-3, 1e-3]), 2e-3)
+    np.testing.assert_allclose(seen, np.array([0, 20e-6, 50e-6]) + 4e-6, rtol=1e-9)  # 4 mm stretched by 1e-3
+
+
+def test_its_deviation_is_the_scatter():
+    feet = (np.array([-2e-3, 5e-3]), np.array([2e-3, 5e-3]), 1.5e-3)
+    draws = np.array([opening(field(1e-6, seed), *feet)[0] for seed in range(200)])
+    stated = opening(field(1e-6), *feet)[1]
+    np.testing.assert_allclose(draws.std(axis=0), stated, rtol=0.2)  # four deviations of a deviation of 200
+
+
+def test_a_foot_off_the_picture_is_refused():
+    with pytest.raises(InputError, match="gauge foot"):
+        opening(field(), np.array([-30e-3, 0.0]), np.array([2e-3, 0.0]), 1e-3)
