@@ -64,13 +64,13 @@ class Design:
     def recentred(self, f_max: float, delta_max: float, steps: int = 2) -> Design:
         """The grid moved by `steps` towards an optimum on its edge; the same grid if it lies inside."""
         return self.moved(
-            steps * _side(f_max, self.f_max, self.f_factors),
-            steps * _side(delta_max, self.delta_max, self.delta_factors),
+            steps * _side(f_max, self.f_max),
+            steps * _side(delta_max, self.delta_max),
         )
 
     def is_edge(self, f_max: float, delta_max: float) -> bool:
         """Whether a point lies on the grid's edge or outside it."""
-        return any((_side(f_max, self.f_max, self.f_factors), _side(delta_max, self.delta_max, self.delta_factors)))
+        return any((_side(f_max, self.f_max), _side(delta_max, self.delta_max)))
 
 
 def _moved(factors: tuple[float, ...], steps: int) -> tuple[float, ...]:
@@ -84,7 +84,7 @@ def _moved(factors: tuple[float, ...], steps: int) -> tuple[float, ...]:
     return tuple(line)
 
 
-def _side(value: float, lines: np.ndarray, factors: tuple[float, ...]) -> int:
+def _side(value: float, lines: np.ndarray) -> int:
     """−1 at or below the lowest line, +1 at or above the highest, 0 inside."""
     slack = 1e-6 * (lines[-1] - lines[0])
     return int(value >= lines[-1] - slack) - int(value <= lines[0] + slack)

@@ -147,35 +147,46 @@ def leave_one_out(surrogate: LagrangeSurrogate) -> np.ndarray:
     lower, through the other nodes of that row (column). Ends are left out: predicting them would be
     extrapolation, which the surrogate is never used for.
 
+    Parameters
+    ----------
+    surrogate : LagrangeSurrogate of numbers
+
     Returns
     -------
-    (k,) array, unit of the values; rows first, k = (n_f − 2) n_d + n_f (n_d − 2)
+    (k,) array, unit of the values; k = (n_f − 2) n_d + n_f (n_d − 2)
     """
-    along_f, along_d = (
-        _line_errors(surrogate.f_nodes, surrogate.values),
-        _line_errors(surrogate.d_nodes, surrogate.values.T),
-    )
-    return np.concatenate([along_f[0].ravel(), along_d[0].ravel()])
+    along_f = _line_errors(surrogate.f_nodes, surrogate.values)
+    along_d = _line_errors(surrogate.d_nodes, surrogate.values.T)
+    return np.concatenate([along_f.ravel(), along_d.ravel()])
 
 
 def node_scatter(surrogate: LagrangeSurrogate) -> tuple[float, int]:
-    """Standard deviation of one node's value that would explain the leave-one-out errors, and its degrees of freedom.
+    """Standard deviation of what changes from node to node without order, and its degrees of freedom.
 
-    The error of a prediction with weights w has variance σ²(1 + Σw²). All errors of one line are the same
-    highest difference, so a line is one degree of freedom. It is an upper estimate where part of the error
-    is curvature that the full multinomial follows.
+    The values are split into orthonormal polynomials of the two parameters. A smooth function lives in the
+    low degrees, independent scatter (crack paths that change from node to node) equally in all: its variance
+    is the mean square of the coefficients whose degrees a, b satisfy a/(n_f − 1) + b/(n_d − 1) > 1.
+
+    Parameters
+    ----------
+    surrogate : LagrangeSurrogate of numbers, at least three lines either way
     """
-    e_f, s_f = _line_errors(surrogate.f_nodes, surrogate.values)
-    e_d, s_d = _line_errors(surrogate.d_nodes, surrogate.values.T)
-    scaled = np.concatenate([(e_f**2 / s_f).ravel(), (e_d**2 / s_d).ravel()])
-    return float(np.sqrt(scaled.mean())) if scaled.size else 0.0, sum(surrogate.values.shape[:2]) - 1
+    coefficients = _orthonormal(surrogate.f_nodes).T @ surrogate.values @ _orthonormal(surrogate.d_nodes)
+    n_f, n_d = coefficients.shape
+    high = np.add.outer(np.arange(n_f) / (n_f - 1), np.arange(n_d) / (n_d - 1)) > 1 + 1e-9
+    return float(np.sqrt(np.mean(coefficients[high] ** 2))), int(high.sum())
 
 
-def _line_errors(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Prediction − value along the first axis for all but its ends, and 1 + Σw² of each prediction."""
-    error, spread = np.empty((len(nodes) - 2, values.shape[1])), np.empty((len(nodes) - 2, values.shape[1]))
+def _orthonormal(nodes: np.ndarray) -> np.ndarray:
+    """Polynomials of rising degree, orthonormal over the nodes; (n, n), one a column."""
+    t = (nodes - nodes[0]) / (nodes[-1] - nodes[0]) * 2 - 1
+    return np.linalg.qr(np.vander(t, increasing=True))[0]
+
+
+def _line_errors(nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Prediction − value along the first axis, for all but its ends."""
+    error = np.empty((len(nodes) - 2, values.shape[1]))
     for k in range(1, len(nodes) - 1):
         weight = lagrange_basis(np.delete(nodes, k), nodes[k], 1)[0]
         error[k - 1] = weight @ np.delete(values, k, axis=0) - values[k]
-        spread[k - 1] = 1 + weight @ weight
-    return error, spread
+    return error

@@ -237,12 +237,10 @@ def _modulus(fit: Fit, relative: float) -> Contribution:
 
 
 def _scatter(fit: Fit) -> Contribution:
-    """Path changes from node to node and the multinomial's own error, as if every node scattered alone."""
-    std, lines = node_scatter(fit.surrogate)
+    """Crack paths that change from node to node: every node scatters alone, and the optimum with them."""
+    std, freedom = node_scatter(fit.surrogate)
     slopes = fit.surrogate.of_nodes().gradient(fit.minimum.position).reshape(2, -1)
     moved = std * np.linalg.solve(fit.minimum.hessian, slopes)
     unit = " m²" if fit.comparison.objective is Objective.FIELDS else ""
-    sentence = (
-        f"scatter of the simulations about the multinomial, {std:.2g}{unit} in the objective (from leaving nodes out)"
-    )
-    return Contribution("scatter", sentence, moved @ moved.T, float(lines))
+    sentence = f"scatter of the simulations about the multinomial, {std:.2g}{unit} in the objective"
+    return Contribution("scatter", sentence, moved @ moved.T, float(freedom))

@@ -105,14 +105,27 @@ def test_the_leave_one_out_error_covers_the_error_between_nodes():
     assert all(covered)  # the prediction lacks a degree that the surrogate has
 
 
-def test_scatter_of_the_nodes_is_measured():
-    found = [
-        node_scatter(
-            LagrangeSurrogate(lines(5, F_MID), lines(5, D_MID), np.random.default_rng(s).normal(0, 3.0, (5, 5)))
-        )[0]
-        for s in range(200)
-    ]
-    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(3.0, rel=0.06)  # 200 × 9 squares: 1.7 %, correlated: ×3
+@pytest.mark.parametrize(("n_f", "n_d", "freedom"), [(5, 5, 10), (6, 6, 15), (4, 6, 11), (3, 3, 3)])
+def test_scatter_of_the_nodes_is_measured(n_f, n_d, freedom):
+    found = []
+    for seed in range(300):
+        values = np.random.default_rng(seed).normal(0, 3.0, (n_f, n_d))
+        std, count = node_scatter(LagrangeSurrogate(lines(n_f, F_MID), lines(n_d, D_MID), values))
+        assert count == freedom
+        found.append(std)
+    # χ² of 300 × freedom: three standard errors of a root mean square
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(3.0, rel=3 / np.sqrt(2 * 300 * freedom))
+
+
+def test_a_smooth_surface_counts_as_scatter_only_to_the_fifth_order():
+    """On a grid half as wide the part taken for scatter falls by 2⁵, and so vanishes beside curvature."""
+    for seed in range(20):
+        function, found = smooth(np.random.default_rng(seed)), []
+        for width in (0.25, 0.125):
+            x = width * np.linspace(-1, 1, 5)
+            values = function(*np.meshgrid(x, x, indexing="ij"))
+            found.append(node_scatter(LagrangeSurrogate(lines(5, F_MID), lines(5, D_MID), values))[0])
+        assert found[0] / found[1] == pytest.approx(32, rel=0.25)  # the sixth order adds a share of the width
 
 
 @pytest.mark.parametrize(

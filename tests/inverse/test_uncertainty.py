@@ -116,7 +116,7 @@ def test_scatter_of_the_nodes_is_covered_where_the_curvature_is_certain():
         if one is None:
             continue
         scatter = next(c for c in uncertainty(one, NONE, 0.0).budget if c.name == "scatter")
-        inside.append(np.abs(one.minimum.position - TRUTH) <= 2.26 * np.sqrt(np.diag(scatter.covariance)))  # t of 9
+        inside.append(np.abs(one.minimum.position - TRUTH) <= 2.23 * np.sqrt(np.diag(scatter.covariance)))  # t of 10
         sure.append(curvature_certainty(one) > 3)
     inside, sure = np.array(inside), np.array(sure)
     assert sure.sum() > 120
