@@ -19,6 +19,7 @@ from pipeline.dic.status import Status
 
 _ROUNDS = 4  # of seeding: parts that no neighbour reaches get seeds of their own
 _SEEDS = 9
+_UNUSUAL = 3.0  # noisy pictures: points fail only when they scatter so many times more than their like
 _OUTCOMES = np.array([Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED])
 
 
@@ -100,7 +101,7 @@ def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Cor
     rounds = 1 if start is not None and _good(match, found).any() else _ROUNDS
     found = _seeded(match, reference, current, found, drift, rounds)
     good = _good(match, found)
-    if good.sum() < max(3, 0.02 * good.size):
+    if good.sum() < max(1, 0.02 * good.size):
         raise ConvergenceError(
             f"only {int(good.sum())} of {good.size} points of the reference are found in the picture: the motion may "
             f"be larger than search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
@@ -241,7 +242,9 @@ def _correlation(match: Match, sheet: Sheet, noise: MatchNoise) -> Correlation:
     variance = np.where(np.isfinite(sheet.variance), np.maximum(sheet.variance, noise.variance), np.nan)
     std = deviation(sheet.covariance[:, :2], sheet.count, variance)
     status = sheet.status.copy()
-    status[sheet.sound & ~(std.max(axis=1) <= match.settings.imprecise_px)] = Status.NO_CONTRAST
+    largest = std.max(axis=1)
+    usual = float(np.median(largest[sheet.sound])) if sheet.sound.any() else 0.0
+    status[sheet.sound & ~(largest <= max(match.settings.imprecise_px, _UNUSUAL * usual))] = Status.NO_CONTRAST
     return Correlation(
         grid=match.grid,
         warp=sheet.warp,

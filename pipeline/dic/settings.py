@@ -28,7 +28,7 @@ class Settings:
     split : bool; cut subsets whose affine match is poor
     max_iterations, tolerance_px : of Gauss–Newton; the tolerance is on the motion of a typical pixel
     accept_zncc : float; least correlation of a point that hands its warp to its neighbours
-    imprecise_px : float; points whose standard deviation is above it are failed
+    imprecise_px : float; points fail whose standard deviation is above it and above three times the usual one
     threads : int
     """
 
