@@ -11,7 +11,7 @@ from matplotlib.colors import CenteredNorm, Normalize
 from pipeline.core.field import rigid_motion
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM, UM
-from pipeline.report.style import BLACK, GREY, MEASURED, SIMULATED, SKY, colour_bar, disks, specimen_axes
+from pipeline.report.style import BLACK, GREY, MEASURED, SIMULATED, SKY, colour_bar, disks, outline, specimen_axes
 
 
 def displacement_vectors(
@@ -105,8 +105,7 @@ def displacement_map(
     both_ways = values.min() < 0 < values.max() and min(-values.min(), values.max()) > 0.2 * np.abs(values).max()
     norm = CenteredNorm() if both_ways else Normalize(values.min(), values.max())
     painted = disks(axes, position, radius, array=values, cmap="RdBu_r" if both_ways else "cividis", norm=norm)
-    for polygon in specimen.outline():
-        axes.plot(*polygon.T / MM, color=BLACK, linewidth=0.7)
+    outline(axes, specimen)
     specimen_axes(axes, specimen.bounds, margin=2 * MM)
     name = ("u_x", "u_y")[component]
     colour_bar(axes, painted, f"${name}$ (µm)")

@@ -13,7 +13,7 @@ from pipeline.core.particles import Bonds, Particles, Phase
 from pipeline.core.problem import CohesiveLaw, Problem
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
-from pipeline.report.style import BLACK, DAMAGE, PHASE_COLOURS, colour_bar, disks, specimen_axes
+from pipeline.report.style import BLACK, DAMAGE, PHASE_COLOURS, colour_bar, disks, outline, specimen_axes
 
 NAMES = {Phase.AGGREGATE: "aggregate", Phase.MASTIC: "mastic"}
 
@@ -29,7 +29,7 @@ def phases(axes: Axes, specimen: Specimen, particles: Particles) -> Axes:
     """
     palette = np.array([PHASE_COLOURS.get(k, "#ff00ff") for k in range(max(Phase) + 1)])
     disks(axes, particles.position, particles.radius, facecolors=palette[particles.phase].tolist())
-    _outline(axes, specimen)
+    outline(axes, specimen)
     specimen_axes(axes, specimen.bounds, margin=2 * MM)
     present = [phase for phase in NAMES if np.any(particles.phase == phase)]
     patches = [
@@ -77,7 +77,7 @@ def bond_damage(
     lines.set(linewidths=1.4, capstyle="round")
     axes.add_collection(lines)
     if displacement is None:
-        _outline(axes, problem.specimen)
+        outline(axes, problem.specimen)
     specimen_axes(axes, window or problem.specimen.bounds, margin=0.0 if window else 2 * MM)
     label = "softening $(\\kappa-\\delta_\\mathrm{peak})/(\\delta_\\mathrm{max}-\\delta_\\mathrm{peak})$"
     colour_bar(axes, ScalarMappable(lines.norm, DAMAGE), label)
@@ -99,11 +99,6 @@ def _faces(at: np.ndarray, bonds: Bonds, which: np.ndarray, radius: float) -> tu
     length = np.hypot(across[:, 0], across[:, 1])[:, None]
     normal = np.column_stack([-across[:, 1], across[:, 0]]) / np.where(length > 0, length, 1)
     return (one + two) / 2, normal * radius / np.sqrt(3)
-
-
-def _outline(axes: Axes, specimen: Specimen) -> None:
-    for polygon in specimen.outline():
-        axes.plot(*polygon.T / MM, color=BLACK, linewidth=0.7)
 
 
 def _share(particles: Particles, phase: Phase) -> str:

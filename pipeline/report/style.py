@@ -16,6 +16,7 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from pipeline.core.particles import Phase
+from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 
 MM_PER_INCH = 25.4
@@ -116,7 +117,15 @@ def disks(axes: Axes, position: np.ndarray, radius: float, **colour: Any) -> Ell
     """
     size = np.full(len(position), 2 * 2 / np.sqrt(3) * radius / MM)
     found = EllipseCollection(
-        size, size, 0 * size, units="xy", offsets=position / MM, offset_transform=axes.transData, linewidths=0, **colour
+        size,
+        size,
+        0 * size,
+        units="xy",
+        offsets=position / MM,
+        offset_transform=axes.transData,
+        linewidths=0,
+        antialiaseds=False,
+        **colour,
     )
     axes.add_collection(found)
     return found
@@ -136,6 +145,13 @@ def specimen_axes(axes: Axes, bounds: tuple[float, float, float, float], margin:
     axes.set(xlabel="$x$ (mm)", ylabel="$y$ (mm)")
     axes.set_aspect("equal")
     axes.spines[:].set_visible(False)
+
+
+def outline(axes: Axes, specimen: Specimen) -> None:
+    """The boundary of a specimen and its notch, on a light rim that shows on dark ground."""
+    for polygon in specimen.outline():
+        axes.plot(*polygon.T / MM, color="white", linewidth=1.6)
+        axes.plot(*polygon.T / MM, color=BLACK, linewidth=0.7)
 
 
 def colour_bar(axes: Axes, mappable: ScalarMappable, label: str) -> Axes:
