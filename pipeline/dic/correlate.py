@@ -216,6 +216,8 @@ def _sheet(match: Match, found: dict[str, np.ndarray], noise: MatchNoise) -> She
     n = match.grid.size
     status = np.where(found["outcome"] < 0, Status.NOT_REACHED, _OUTCOMES[found["outcome"]])
     status[status == Status.OK] = Status.POOR_MATCH
+    if match.carried is not None:
+        status[~np.isfinite(match.carried[:, 0])] = Status.NOT_REACHED  # lost when the reference was renewed
     empty = {"line": 2, "far": 6, "jump": 2, "jump_std": 2}
     sheet = Sheet(
         **{

@@ -73,11 +73,12 @@ def track(
     grid = Grid.over(first.shape, settings)
     base = _Base(first, core().Picture(first), None)
     before: tuple[np.ndarray, Any, Correlation] | None = None
+    earlier: Correlation | None = None
     sound = 0.0
     for number, frame in enumerate(series, start=1):
         grey = checked(frame, f"frame {number}", like=first)
         picture = core().Picture(grey)
-        start = before[2] if before else None
+        start = _ahead(before[2], earlier) if before else None
         result = _against(base, picture, grey, grid, settings, start, number)
         if before and before[2] is not base.carried and _decayed(result, grey.shape, sound, renew_znssd):
             base = _Base(*before)
@@ -87,8 +88,20 @@ def track(
         if result is None:
             raise ConvergenceError(f"frame {number}: the speckle of the frame before is not found again")
         sound = max(sound, _share(result, grey.shape))
+        earlier = before[2] if before else None
         before = (grey, picture, result)
         yield result
+
+
+def _ahead(last: Correlation, earlier: Correlation | None) -> Correlation:
+    """The last result moved on by the step that most points made before; from rest where there is none."""
+    moved = last.warp[:, :2] - (earlier.warp[:, :2] if earlier else 0.0)
+    both = last.valid & earlier.valid if earlier else last.valid
+    if not both.any():
+        return last
+    step = np.zeros(6)
+    step[:2] = np.median(moved[both], axis=0)
+    return replace(last, warp=last.warp + step)
 
 
 def _against(

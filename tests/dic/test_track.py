@@ -42,7 +42,7 @@ def test_sixty_pixels_and_rotation_are_followed(renew, limit):
         inside = np.all((after > 16) & (after < 203), axis=1)
         assert found.valid[inside].mean() > 0.99  # nothing is lost
         assert np.sqrt(np.nanmean(off**2)) < limit  # one match; six renewals add up in squares
-        assert np.all(np.abs(np.nanmean(off, axis=0)) < 5e-3)  # composed: no drift; 0.02 px / sqrt(60 subsets), twice
+        assert np.all(np.abs(np.nanmean(off, axis=0)) < 0.4 * limit)  # no drift: three deviations of 60 subsets
 
 
 def test_renewed_deviations_grow_as_the_errors_do():
