@@ -200,6 +200,7 @@ def _truth_text(test: VirtualTest, truth: Truth, request: Request, settings: Run
         "network": {"pitch_mm": test.pitch / MM, "points": test.particles, "bonds": test.bonds},
         "factors": vars(test.factors),
         "noise": {"displacement_px": request.noise_px, "mm_per_px": CAMERA_MM_PER_PX, "load_n": request.load_noise_n},
+        "factors_check": vars(test.check),
         "energy_error": test.solution.energy.error,
     }
     return (json.dumps(plain(known), indent=2, sort_keys=True) + "\n").encode()

@@ -15,7 +15,7 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.materials.mixture import Mixture
-from pipeline.twin.calibration import calibrated_factors
+from pipeline.twin.calibration import CutCheck, calibrated_factors, check_factors
 from pipeline.twin.network import irregular_network
 from pipeline.twin.problem import Factors, PhaseAt, Truth, twin_problem
 
@@ -78,6 +78,7 @@ class VirtualTest:
     field : DisplacementField with noise, counted by time, from the unloaded state
     exact_curve, exact_field : the same without noise
     factors : Factors of the network
+    check : CutCheck; how well the network stands for the lattice, measured on cuts
     pitch : float, m
     particles, bonds : int
     solution : Solution of the engine
@@ -88,6 +89,7 @@ class VirtualTest:
     exact_curve: LoadCurve
     exact_field: DisplacementField
     factors: Factors
+    check: CutCheck
     pitch: float
     particles: int
     bonds: int
@@ -120,7 +122,7 @@ def virtual_test(
     factors : Factors; those of `twin.calibration` where not given
     """
     factors = calibrated_factors() if factors is None else factors
-    of_network, of_noise = rng.spawn(2)
+    of_network, of_noise, of_cuts = rng.spawn(3)
     network = irregular_network(specimen, pitch, of_network)
     stations = recording.frame_time[1:] * recording.cmod_rate
     problem = twin_problem(
@@ -136,6 +138,7 @@ def virtual_test(
         exact_curve=curve,
         exact_field=field,
         factors=factors,
+        check=check_factors(network, factors, of_cuts),
         pitch=pitch,
         particles=problem.particles.count,
         bonds=problem.bonds.count,
