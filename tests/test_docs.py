@@ -142,7 +142,8 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "function", [identify.identification_result, simulate.simulate, simulate.test_result, model.model]
+    "function",
+    [identify.identification_result, simulate.simulate, simulate.test_result, model.model, virtual_test._truth_text],
 )
 def test_every_key_of_a_result_is_explained(function):
     named = set(re.findall(r"`(\w+)`", (ROOT / "docs" / "bundle.md").read_text("utf-8")))
