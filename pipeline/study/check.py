@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.store.bundle import Bundle, read_bundle
-from pipeline.study.model import read_phases, refuse_untold
+from pipeline.study.assembly import read_phases, refuse_untold
 
 
 def check(folder: Path) -> str:

@@ -1,6 +1,6 @@
-"""A slice of a real concrete tomography as the photograph of a beam: a trial of the pipeline, not of a size-true concrete.
+"""A slice of a real concrete tomography as the photograph of a beam: it tries the pipeline, not a size-true concrete.
 
-The volume is a neutron tomography of a concrete cylinder (Stamati et al., JOSS 5 (2020) 2286; Roubin et al., Cem. Concr.
+The volume is a neutron tomography of a cylinder (Stamati et al., JOSS 5 (2020) 2286; Roubin et al., Cem. Concr.
 Compos. 104 (2019) 103336). Its largest inscribed square is scaled to the depth of the beam; beyond the square, to the
 left and the right, its mirror images go on, so that a whole beam is covered.
 """

@@ -27,9 +27,9 @@ from pipeline.store.problem_key import problem_key
 from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
+from pipeline.study.assembly import Model, build_model, settings_of
 from pipeline.study.engines import Engine
 from pipeline.study.engines import engine as engine_of
-from pipeline.study.model import Model, build_model, settings_of
 from pipeline.study.observation import at_stations, measured_test
 from pipeline.study.pages import identification_page
 from pipeline.study.simulate import curve_result

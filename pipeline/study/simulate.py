@@ -18,8 +18,8 @@ from pipeline.store.layouts import SIMULATE
 from pipeline.store.problem_key import problem_key
 from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
+from pipeline.study.assembly import build_model, settings_of
 from pipeline.study.engines import engine as engine_of
-from pipeline.study.model import build_model, settings_of
 from pipeline.study.observation import observe_solution
 from pipeline.study.pages import simulation_page
 

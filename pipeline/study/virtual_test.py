@@ -24,7 +24,7 @@ from pipeline.store.experiment import Experiment
 from pipeline.store.images import read_grey, read_labels
 from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
 from pipeline.store.results import plain
-from pipeline.study.model import grey_levels, mixture, read_phases, settings_of
+from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_of
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
 from pipeline.twin.virtual_test import virtual_test as break_network

@@ -1,0 +1,206 @@
+"""From a bundle to a bonded-particle model of its specimen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.config import RunSettings, load_settings, run_settings
+from pipeline.core.errors import InputError, UnavailableError
+from pipeline.core.particles import Bonds, Particles
+from pipeline.core.problem import Gauge, Grip, Problem
+from pipeline.materials.mixture import Mixture
+from pipeline.microstructure.attachment import attach_gauge, attach_grips, gauge_remark
+from pipeline.microstructure.packing import hexagonal_packing
+from pipeline.microstructure.phase_map import PhaseMap, from_labels
+from pipeline.microstructure.phases import PackingReport, lay_phases
+from pipeline.microstructure.segment import segment
+from pipeline.store.bundle import Bundle
+from pipeline.store.images import read_grey, read_labels
+from pipeline.store.start import start_parameters
+
+PRE_PEAK = (0.25, 0.5, 0.75)  # of the CMOD at peak: frames kept for the diagnosis
+
+
+@dataclass(frozen=True)
+class Model:
+    """A specimen as particles and bonds, with everything but the two unknowns.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    phase_map : PhaseMap or None; None is mastic throughout
+    particles : Particles
+    bonds : Bonds
+    grips : tuple of Grip
+    gauge : Gauge
+    mixture : Mixture
+    report : PackingReport
+    remarks : tuple of str; what a user should know
+    """
+
+    bundle: Bundle
+    phase_map: PhaseMap | None
+    particles: Particles
+    bonds: Bonds
+    grips: tuple[Grip, ...]
+    gauge: Gauge
+    mixture: Mixture
+    report: PackingReport
+    remarks: tuple[str, ...]
+
+    @property
+    def force_scale(self) -> float:
+        """f_max of this lattice over f_max of the bundle's: f_max/(2 r t) is kept."""
+        return self.particles.radius / self.bundle.model.radius
+
+    def problem(
+        self,
+        f_max: float,
+        delta_max: float,
+        *,
+        frames: np.ndarray | None = None,
+        cmod_max: float | None = None,
+        accuracy: float = 0.01,
+    ) -> Problem:
+        """The fracture test at one pair of parameters.
+
+        Parameters
+        ----------
+        f_max : float, N; of a mastic bond of the *bundle's* lattice, rescaled here
+        delta_max : float, m
+        frames : (k,) array, m; CMOD of the full fields, those of `frame_stations` by default
+        cmod_max : float, m; end of the test, the bundle's by default
+        accuracy : float; quasi-static error asked for
+        """
+        end = self.bundle.cmod_max if cmod_max is None else cmod_max
+        wanted = frame_stations(self.bundle) if frames is None else frames
+        return Problem(
+            specimen=self.bundle.specimen,
+            particles=self.particles,
+            bonds=self.bonds,
+            law=self.mixture.law(self.bonds, self.bundle.specimen.thickness, f_max * self.force_scale, delta_max),
+            grips=self.grips,
+            gauge=self.gauge,
+            kinematics=self.bundle.model.motion,
+            cmod_max=end,
+            stations=wanted[wanted <= end],
+            accuracy=accuracy,
+            cmod_rate=self.bundle.loading.cmod_rate,
+        )
+
+
+def build_model(bundle: Bundle, radius: float | None = None) -> Model:
+    """Read the specimen's image, pack particles, lay phases, attach grips and gauge.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    radius : float, m; of the particles, the bundle's by default
+
+    Raises
+    ------
+    InputError, UnavailableError
+        where image, specimen or material are refused
+    """
+    refuse_untold(bundle)
+    phase_map, remarks = read_phases(bundle)
+    packing = hexagonal_packing(bundle.specimen, radius or bundle.model.radius, bundle.model.lattice_angle)
+    particles, bonds, report = lay_phases(bundle.specimen, packing, phase_map)
+    remark = gauge_remark(bundle.specimen, particles)
+    if report.islands or report.loose:
+        remarks += (f"{report.islands + report.loose} particles did not hold to the specimen and were left out",)
+    return Model(
+        bundle=bundle,
+        phase_map=phase_map,
+        particles=particles,
+        bonds=bonds,
+        grips=attach_grips(bundle.specimen, particles),
+        gauge=attach_gauge(bundle.specimen, particles),
+        mixture=mixture(bundle, radius),
+        report=report,
+        remarks=remarks + ((remark,) if remark else ()),
+    )
+
+
+def read_phases(bundle: Bundle) -> tuple[PhaseMap | None, tuple[str, ...]]:
+    """The phases of a bundle's specimen, and what to know of how they were found; None: all mastic."""
+    if bundle.labels is None and bundle.specimen_image is None:
+        return None, ("no image of the specimen: it is mastic throughout",)
+    if bundle.image_frame is None:
+        raise InputError("experiment.toml: an image of the specimen needs [specimen.image]: mm_per_px and origin_px")
+    placement = bundle.image_frame.placement()
+    if bundle.labels is not None:
+        phase_map, stones = from_labels(read_labels(bundle.labels), placement)
+        return phase_map, (f"{stones.count} stones, {stones.small} below 2.36 mm counted as mastic",)
+    assert bundle.specimen_image is not None
+    found = segment(grey_levels(read_grey(bundle.specimen_image)), placement)
+    told = (
+        f"{found.stones} stones ({found.split} by splitting touching ones, {found.small} below 2.36 mm counted as "
+        f"mastic), aggregate {found.aggregate_fraction:.1%} of the photograph, taken as {found.aggregate_is}"
+    )
+    return found.phase_map, (told,)
+
+
+def mixture(bundle: Bundle, radius: float | None = None) -> Mixture:
+    """The material of a bundle for particles of a radius (m), in SI."""
+    material = bundle.material
+    f_max, delta_max = start_parameters(bundle, radius)
+    modulus = material.mastic_modulus
+    if modulus is None:
+        raise InputError("experiment.toml: [material] mastic_modulus_gpa is missing: give it")
+    return Mixture(
+        mastic_modulus=modulus,
+        aggregate_modulus=material.aggregate_modulus or modulus,
+        poissons_ratio=material.poissons_ratio,
+        plane=material.plane_state,
+        f_max_start=f_max,
+        delta_max_start=delta_max,
+        interface_strength_ratio=material.interface_strength_ratio,
+        interface_opening_ratio=material.interface_opening_ratio,
+        aggregate_strength_ratio=material.aggregate_strength_ratio,
+        aggregate_opening_ratio=material.aggregate_opening_ratio,
+        aggregate_follows=material.aggregate_follows,
+        touching=material.touching,
+    )
+
+
+def refuse_untold(bundle: Bundle) -> None:
+    """Refuse what the bundle asks for and this version cannot do, or nobody could."""
+    material = bundle.material
+    if material.softening != "linear" or material.unloading != "secant":
+        raise UnavailableError(
+            f"softening = {material.softening!r} with unloading = {material.unloading!r} is not in this version: "
+            "use linear and secant"
+        )
+    ratio = material.plane_state.central_force_ratio
+    shear = (material.shear_strength_ratio, material.shear_opening_ratio)
+    if shear != (1.0, 1.0) and abs(material.poissons_ratio - ratio) < 1e-3:
+        raise InputError(
+            f"shear_strength_ratio and shear_opening_ratio = {shear} cannot be identified: at poissons_ratio = "
+            f"{material.poissons_ratio:g} bonds carry no shear (K^s = 0); leave them at 1"
+        )
+
+
+def frame_stations(bundle: Bundle) -> np.ndarray:
+    """CMOD (m) at which full fields are kept: before the peak, and the stations of the comparison."""
+    if bundle.curve is None:
+        step = bundle.observation.cmod_step
+        return step * np.arange(1, bundle.observation.cmod_count + 1)
+    peak = bundle.stations[0]
+    return np.concatenate([peak * np.array(PRE_PEAK), bundle.stations])
+
+
+def grey_levels(image: np.ndarray) -> np.ndarray:
+    """Whole grey levels of 8 or 16 bits from floating-point ones."""
+    top = float(image.max())
+    if image.min() < 0 or top > np.iinfo(np.uint16).max:
+        raise InputError(f"grey levels from {image.min():g} to {top:g} are not of 8 or 16 bits: export the image so")
+    return np.rint(image).astype(np.uint8 if top <= np.iinfo(np.uint8).max else np.uint16)
+
+
+def settings_of(config: Path | None, **options: object) -> RunSettings:
+    """Settings of a run: a file's, if one is given, and options over it."""
+    return load_settings(config, options) if config else run_settings(options)
