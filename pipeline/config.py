@@ -105,7 +105,7 @@ def load_settings(path: Path, options: Mapping[str, Any] | None = None) -> RunSe
         raw = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise MissingFileError(f"{path} does not exist: give the TOML file with the settings of the run") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # not there, not UTF-8, not TOML, nested too deep
         raise InputError(f"{path.name} cannot be read as TOML: {error}") from None
     given = {key: value for key, value in (options or {}).items() if value is not None}
     return run_settings(raw | given, path.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -20,7 +21,8 @@ _TYPES = {
     "finite_number": "must be a finite number",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
-    "string_pattern_mismatch": "may hold letters, digits, dot, dash and underscore only",
+    "string_pattern_mismatch": "may hold letters, digits, dot, dash and underscore only, not . or - first",
+    "string_too_long": "is too long",
     "too_short": "has too few entries",
     "too_long": "has too many entries",
 }
@@ -98,5 +100,8 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
 
 def _shown(value: Any) -> str:
     """A value as it stands in the file, shortened."""
-    text = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+    if isinstance(value, str):
+        text = json.dumps(value, ensure_ascii=False)  # a line break must not break the message
+    else:
+        text = str(value).lower() if isinstance(value, bool) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."

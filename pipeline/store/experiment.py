@@ -59,7 +59,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path.name} cannot be read ({error.strerror}): check {path}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}): save it as UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, brackets nested as deep
         raise InputError(f"{path.name} is not valid TOML: {error}") from None
 
 

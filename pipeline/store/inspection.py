@@ -52,7 +52,7 @@ def _try_to_cut(raw: Any) -> None:
         return
     names = [name for name in section.model_fields if name.endswith("_mm")]
     values = [raw.get(name, section.model_fields[name].default) for name in names]
-    if all(isinstance(value, int | float) and np.isfinite(value) for value in values):
+    if all(isinstance(value, int | float) and abs(value) < 1e9 for value in values):  # neither NaN nor beyond a float
         section.kind(**{n.removesuffix("_mm"): float(v) * MM for n, v in zip(names, values, strict=True)})
 
 

@@ -64,7 +64,7 @@ def first_experiment(geometry: str, name: str, cmod_rate: float | None = None) -
     return Experiment.model_validate(
         {
             "format": 1,
-            "name": re.sub(r"[^A-Za-z0-9._-]", "-", name) or "test",
+            "name": re.sub(r"[^A-Za-z0-9._-]", "-", name).lstrip(".-")[:100] or "test",
             "specimen": {"geometry": geometry, **FIRST[geometry]},
             "loading": {"cmod_rate_mm_per_min": rate},
             "material": {"mastic_modulus_gpa": 10.0, "aggregate_modulus_gpa": 50.0},

@@ -80,8 +80,11 @@ def clock_problems(file: str, time: np.ndarray, curve: LoadCurve) -> list[str]:
 
 
 def place_problems(file: str, points: np.ndarray, specimen: Specimen) -> list[str]:
-    """A sentence where fewer than half of the points (n, 2), m, lie on the specimen."""
+    """A sentence where points (n, 2), m, are all but one, or fewer than half of them lie on the specimen."""
     x0, y0, x1, y1 = specimen.bounds
+    spread = float(np.ptp(points, axis=0).max())
+    if len(points) > 1 and spread < 1e-3 * max(x1 - x0, y1 - y0):
+        return [f"{file}: points lie within {spread / MM:.3g} mm of each other: are these metres? points are in mm"]
     margin = 0.05 * max(x1 - x0, y1 - y0)
     low, high = np.array([x0, y0]) - margin, np.array([x1, y1]) + margin
     if np.all((points >= low) & (points <= high), axis=1).mean() >= 0.5:

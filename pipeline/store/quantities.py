@@ -48,4 +48,6 @@ Places = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
 Pixel = Annotated[int, Field(ge=0)]
 Pixels = Annotated[int, Field(gt=0)]
 Box = Annotated[tuple[Pixel, Pixel, Pixels, Pixels], Field(strict=False)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$")]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+# no path, no option, no hidden file: it reaches decks and job scripts
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9._-]*$", max_length=100)]

@@ -117,7 +117,8 @@ def _refuse(name: str, problems: list[str]) -> None:
 def opened(path: Path) -> h5py.File:
     """An HDF5 file open for reading; refuses one that is missing, truncated or not HDF5."""
     if not path.is_file():
-        raise MissingFileError(f"{path} does not exist")
+        reason = "is not a file" if path.exists() else "does not exist"
+        raise MissingFileError(f"{path} {reason}: check its name, or make it again")
     try:
         return h5py.File(path, "r", locking=False)
     except (OSError, RuntimeError) as error:

@@ -13,6 +13,7 @@ from pipeline.core.units import GPA, MINUTE, MM, MPA
 from pipeline.materials.elastic import Plane
 from pipeline.microstructure.placement import ImagePlacement
 from pipeline.store.quantities import (
+    Angle,
     BondOpening,
     Box,
     Celsius,
@@ -49,7 +50,7 @@ class PixelFrame(Section):
     origin_px: Pair = Field(
         examples=[[1500.0, 1200.0]], description="column, row of the specimen origin; may lie outside the image"
     )
-    rotation_deg: float = Field(default=0.0, description="turns image axes into specimen axes, counter-clockwise")
+    rotation_deg: Angle = Field(default=0.0, description="turns image axes into specimen axes, counter-clockwise")
     mirror: bool = Field(default=False, description="true: the other face was photographed")
 
     def placement(self) -> ImagePlacement:
@@ -218,7 +219,7 @@ class ModelSection(Section):
 
     particle_radius_mm: Radius = Field(default=0.3, description="half the spacing of particles")
     kinematics: Literal["small", "finite"] = "small"
-    lattice_angle_deg: float = Field(default=90.0, description="direction of close-packed rows against x")
+    lattice_angle_deg: Angle = Field(default=90.0, description="direction of close-packed rows against x")
 
     @property
     def radius(self) -> float:

@@ -9,6 +9,8 @@ from pipeline.store import creep, frames, load_cmod
 
 PHOTOGRAPHS = ("specimen.png", "specimen.tif", "specimen.tiff")
 LABELS, FIELDS = "labels.png", "fields.h5"
+STEMS = ("specimen", "labels")  # under which a picture is taken for one of the specimen
+PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".jp2")
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ def find_sources(folder: Path, fields: Path | None = None) -> tuple[Sources, lis
     labels, own = _file(folder, LABELS), _file(folder, FIELDS)
     pictures = folder / frames.FOLDER
     images = frames.image_files(pictures) if pictures.is_dir() and fields is None else ()
-    problems = _surface_problems(photographs, labels)
+    problems = _surface_problems(photographs, labels) + _kind_problems(folder)
     if fields is None:
         problems += _motion_problems(folder, pictures.is_dir(), len(images), own)
     sources = Sources(
@@ -54,6 +56,20 @@ def find_sources(folder: Path, fields: Path | None = None) -> tuple[Sources, lis
 def _file(folder: Path, name: str) -> Path | None:
     path = folder / name
     return path if path.is_file() else None
+
+
+def _kind_problems(folder: Path) -> list[str]:
+    """A folder where a file should be, a specimen's image in a format that is not read: else silently left out."""
+    surfaces = (*PHOTOGRAPHS, LABELS)
+    names = (*surfaces, FIELDS, frames.FILE, load_cmod.FILE, creep.FILE)
+    folders = (name for name in names if (folder / name).exists() and not _file(folder, name))
+    pictures = (p.name for p in sorted(folder.iterdir()) if p.stem.lower() in STEMS and p.suffix.lower() in PICTURES)
+    wanted = ", ".join(surfaces)
+    return [f"{name}: is not a file: move it away" for name in folders] + [
+        f"{name}: is not read, an image of the specimen is one of {wanted}: convert or rename it"
+        for name in pictures
+        if name not in surfaces
+    ]
 
 
 def _surface_problems(photographs: list[Path], labels: Path | None) -> list[str]:
