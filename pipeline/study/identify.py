@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import InputError, UnavailableError
+from pipeline.core.errors import StoreError, UnavailableError
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import ligament_area
 from pipeline.core.units import MM
@@ -24,14 +24,16 @@ from pipeline.inverse.observations import Measured, Simulated
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.layouts import IDENTIFY
 from pipeline.store.problem_key import problem_key
-from pipeline.store.results import prepare_output, write_arrays, write_result
+from pipeline.store.results import write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
 from pipeline.study.engines import Engine
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.observation import at_stations, measured_test
+from pipeline.study.output import results_folder
 from pipeline.study.pages import identification_page
+from pipeline.study.prospects import refuse_hopeless
 from pipeline.study.simulate import curve_result
 
 
@@ -48,6 +50,7 @@ class Campaign:
     engine : Engine
     store : SimulationStore
     progress : Progress
+    used : keys of the simulations that took part so far; the store may hold others
     """
 
     model: Model
@@ -57,6 +60,7 @@ class Campaign:
     engine: Engine
     store: SimulationStore
     progress: Progress
+    used: set[str] = field(default_factory=set)
 
     def problem(self, f_max: float, delta_max: float) -> Problem:
         """The test at one node of the grid."""
@@ -71,8 +75,14 @@ class Campaign:
         run_all(
             self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress, names=names
         )
-        found = [self.store.get(key) for key in keys]
-        return [(p, s) for p, s in zip(problems, found, strict=True) if s is not None]
+        self.used.update(keys)
+        return [(problem, self._kept(key)) for problem, key in zip(problems, keys, strict=True)]
+
+    def _kept(self, key: str) -> Solution:
+        solution = self.store.get(key)
+        if solution is None:
+            raise StoreError(f"{self.store.path(key)} could be written but not be read: give the same command again")
+        return solution
 
 
 def identify(
@@ -107,18 +117,19 @@ def identify(
     chosen = engine_of(settings.engine)
     read = read_bundle(bundle, fields)
     aim = choose_objective(read, settings.objective)
-    folder = prepare_output(out)
+    folder = results_folder(out, read)
     model = build_model(read, settings.radius)
     field = read.need_fields() if aim is not Objective.LOAD else None
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
+    refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(folder / "simulations")
     campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent())
     found = search(campaign, aim)
-    [(problem, optimum)] = run_optimum(campaign, found)
+    problem, optimum = run_optimum(campaign, found)
     result = identification_result(campaign, found, problem, optimum, time.monotonic() - started)
-    write_result(folder, result)
     write_arrays(folder, IDENTIFY, identification_arrays(campaign, found, optimum))
+    write_result(folder, result)
     identification_page(folder, model, measured, found, problem, optimum, result)
     return _summary(found)
 
@@ -165,13 +176,11 @@ def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
     return estimate(design, simulated, campaign.measured, how)
 
 
-def run_optimum(campaign: Campaign, found: Estimate) -> list[tuple[Problem, Solution]]:
+def run_optimum(campaign: Campaign, found: Estimate) -> tuple[Problem, Solution]:
     """Simulate the test at the estimate itself."""
     campaign.progress.stage("the optimum")
-    runs = campaign.solutions([(found.f_max, found.delta_max)])
-    if not runs:
-        raise InputError("the optimum could not be simulated")
-    return runs
+    [run] = campaign.solutions([(found.f_max, found.delta_max)])
+    return run
 
 
 def identification_result(
@@ -185,6 +194,7 @@ def identification_result(
     return {
         "version": __version__,
         "command": "identify",
+        "bundle": campaign.model.bundle.name,
         "seconds": seconds,
         "engine": campaign.settings.engine,
         "radius_mm": problem.particles.radius / MM,
@@ -211,7 +221,7 @@ def identification_result(
             "objective": found.objective,
         },
         "surrogate_loo_error": found.loo_error,
-        "simulations": len(campaign.store.keys()),
+        "simulations": len(campaign.used),
         "quasi_static_error": optimum.quasi_static_error,
         "load_cmod": curve_result(optimum),
         "peak_load_n": load,

@@ -196,7 +196,7 @@ def _picture(folder: Path, name: str, draw: Draw, caption: str, wide: bool = Fal
 
 
 def _panels(folder: Path, name: str, draw: Sequence[Draw], caption: str) -> Figure:
-    image = png(*draw, **WIDE, columns=max(len(draw), 1))
+    image = png(*draw, width=WIDE["width"], height=WIDE["height"], columns=max(len(draw), 1))
     write_atomically(folder / f"{name}.png", image)
     return Figure(image, caption, wide=True)
 

@@ -16,11 +16,12 @@ from pipeline.execution.simulations import run_all
 from pipeline.store.bundle import read_bundle
 from pipeline.store.layouts import SIMULATE
 from pipeline.store.problem_key import problem_key
-from pipeline.store.results import prepare_output, write_arrays, write_result
+from pipeline.store.results import write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.study.assembly import build_model, settings_of
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.observation import observe_solution
+from pipeline.study.output import results_folder
 from pipeline.study.pages import simulation_page
 
 
@@ -48,23 +49,24 @@ def simulate(
     settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy)
     chosen = engine_of(settings.engine)
     read = read_bundle(bundle)
-    folder = prepare_output(out)
+    folder = results_folder(out, read)
     model = build_model(read, settings.radius)
     problem = model.problem(f_max, delta_max, accuracy=settings.accuracy)
     store = SimulationStore(folder / "simulations")
     key = problem_key(problem, chosen.label)
     progress = progress or Silent()
     progress.stage("simulating")
-    run_all(chosen.solve, {key: problem}, store, workers=1, progress=progress)
+    name = f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
+    run_all(chosen.solve, {key: problem}, store, workers=1, progress=progress, names={key: name})
     solution = store.get(key)
     assert solution is not None
     points = read.observation_points
     seen = observe_solution(problem, solution, points)
     result = {"version": __version__, "command": "simulate", "seconds": solution.seconds, "engine": settings.engine}
-    result |= {"f_max_n": f_max, "delta_max_m": delta_max, "remarks": list(model.remarks)}
+    result |= {"bundle": read.name, "f_max_n": f_max, "delta_max_m": delta_max, "remarks": list(model.remarks)}
     result |= test_result(problem, solution, points, seen)
-    write_result(folder, result)
     write_arrays(folder, SIMULATE, simulation_arrays(problem, solution, points, seen))
+    write_result(folder, result)
     simulation_page(folder, model, problem, solution, result)
     cmod, load = solution.curve.peak()
     return f"peak load {load:.0f} N at CMOD {cmod / MM:.3f} mm; quasi-static error {solution.quasi_static_error:.2%}"

@@ -8,8 +8,8 @@ inclined by φ to the normal of the line opens by w·cos φ. Then, per unit leng
 - energy: Σ facet is the length of a staircase of facets. It is 2/√3 along a row of the hexagonal lattice, where δ_max is
   defined (angle factor 1), and 4/π for an isotropic network (Cauchy–Crofton).
 
-So f_max needs no factor, and δ_max the factor (2/√3)/(4/π) = π/(2√3). The stiffness factor was measured on patches under
-uniform strain (`tests/twin`).
+So f_max needs no factor, and δ_max the factor (2/√3)/(4/π) = π/(2√3). The stiffness factor makes up for what a disordered
+network gives way beyond uniform strain; it was measured on homogeneous networks (`tests/twin`).
 """
 
 from __future__ import annotations
