@@ -69,7 +69,7 @@ def finish(summary: str | None, place: Path) -> None:
     """Print what a command found and where the result lies."""
     if summary:
         print(summary)
-    print(f"result: {place}")
+    print(f"result: {place}", flush=True)
 
 
 @app.command()
@@ -107,11 +107,12 @@ def model(
     debug: Debug = False,
 ) -> None:
     """Build the bonded-particle model of a specimen, and draw it."""
-    with exit_codes(debug), Display() as progress:
-        from pipeline.study.model import model as build
+    with exit_codes(debug):
+        with Display() as progress:
+            from pipeline.study.model import model as build
 
-        summary = build(bundle, out, radius_mm=radius_mm, config=config, progress=progress)
-    finish(summary, out)
+            summary = build(bundle, out, radius_mm=radius_mm, config=config, progress=progress)
+        finish(summary, out)
 
 
 @app.command()
@@ -131,22 +132,23 @@ def simulate(
     debug: Debug = False,
 ) -> None:
     """Simulate one fracture test."""
-    with exit_codes(debug), Display() as progress:
-        refuse_until_built(law=law, effect=effect)
-        from pipeline.study.simulate import simulate as run
+    with exit_codes(debug):
+        with Display() as progress:
+            refuse_until_built(law=law, effect=effect)
+            from pipeline.study.simulate import simulate as run
 
-        summary = run(
-            bundle,
-            out,
-            f_max=f_max,
-            delta_max=delta_max,
-            engine=engine,
-            radius_mm=radius_mm,
-            accuracy=accuracy,
-            config=config,
-            progress=progress,
-        )
-    finish(summary, out)
+            summary = run(
+                bundle,
+                out,
+                f_max=f_max,
+                delta_max=delta_max,
+                engine=engine,
+                radius_mm=radius_mm,
+                accuracy=accuracy,
+                config=config,
+                progress=progress,
+            )
+        finish(summary, out)
 
 
 @app.command()
@@ -167,25 +169,26 @@ def identify(
     debug: Debug = False,
 ) -> None:
     """Estimate f_max and delta_max of the mastic from a test."""
-    with exit_codes(debug), Display() as progress:
-        refuse_until_built(viscoelastic=viscoelastic, levelling=levelling)
-        from pipeline.study.identify import identify as estimate
+    with exit_codes(debug):
+        with Display() as progress:
+            refuse_until_built(viscoelastic=viscoelastic, levelling=levelling)
+            from pipeline.study.identify import identify as estimate
 
-        summary = estimate(
-            bundle,
-            out,
-            engine=engine,
-            grid=grid,
-            objective=objective,
-            radius_mm=radius_mm,
-            accuracy=accuracy,
-            fields=fields,
-            config=config,
-            workers=workers,
-            seed=seed,
-            progress=progress,
-        )
-    finish(summary, out)
+            summary = estimate(
+                bundle,
+                out,
+                engine=engine,
+                grid=grid,
+                objective=objective,
+                radius_mm=radius_mm,
+                accuracy=accuracy,
+                fields=fields,
+                config=config,
+                workers=workers,
+                seed=seed,
+                progress=progress,
+            )
+        finish(summary, out)
 
 
 @app.command("virtual-test")
@@ -210,27 +213,30 @@ def virtual_test(
     debug: Debug = False,
 ) -> None:
     """Make a bundle with known truth by another kind of model."""
-    with exit_codes(debug), Display() as progress:
-        refuse_until_built(creep=creep, effect=effect, images=images)
-        from pipeline.study.virtual_test import virtual_test as make
+    with exit_codes(debug):
+        with Display() as progress:
+            refuse_until_built(creep=creep, effect=effect, images=images)
+            from pipeline.study.output import refuse_measured_bundle
+            from pipeline.study.virtual_test import virtual_test as make
 
-        summary = make(
-            out,
-            geometry=geometry,
-            specimen=specimen,
-            like=like,
-            f_max=f_max,
-            delta_max=delta_max,
-            start=start,
-            radius_mm=radius_mm,
-            mm_per_px=mm_per_px,
-            noise_px=noise_px,
-            load_noise_n=load_noise_n,
-            config=config,
-            seed=seed,
-            progress=progress,
-        )
-    finish(summary, out)
+            refuse_measured_bundle(out)
+            summary = make(
+                out,
+                geometry=geometry,
+                specimen=specimen,
+                like=like,
+                f_max=f_max,
+                delta_max=delta_max,
+                start=start,
+                radius_mm=radius_mm,
+                mm_per_px=mm_per_px,
+                noise_px=noise_px,
+                load_noise_n=load_noise_n,
+                config=config,
+                seed=seed,
+                progress=progress,
+            )
+        finish(summary, out)
 
 
 def main() -> None:

@@ -43,6 +43,23 @@ def number(text: str) -> float:
     return value
 
 
+def bond_strength(text: str) -> float:
+    """f_max in N, in the range of [start] f_max_n."""
+    return _within(text, 1e-6, 1e7, "N")
+
+
+def bond_opening(text: str) -> float:
+    """delta_max in m, in the range of [start] delta_max_m."""
+    return _within(text, 1e-8, 1e-2, "m")
+
+
+def _within(text: str, low: float, high: float, unit: str) -> float:
+    value = positive(text)
+    if not low <= value <= high:
+        raise typer.BadParameter(f"{text} lies outside {low:g} to {high:g} {unit}, the unit of this option")
+    return value
+
+
 def factors(text: str) -> tuple[float, ...]:
     """Numbers above zero, separated by commas, each larger than the one before."""
     values = tuple(positive(part) for part in text.split(","))
@@ -53,10 +70,10 @@ def factors(text: str) -> tuple[float, ...]:
 
 def start_point(text: str) -> tuple[float, float]:
     """f_max in N and delta_max in m, separated by a comma."""
-    values = [positive(part) for part in text.split(",")]
-    if len(values) != 2:
+    parts = text.split(",")
+    if len(parts) != 2:
         raise typer.BadParameter(f"{text!r} must be f_max in N and delta_max in m, as in 71,1.14e-4")
-    return values[0], values[1]
+    return bond_strength(parts[0]), bond_opening(parts[1])
 
 
 def named_number(text: str) -> tuple[str, float]:
@@ -102,11 +119,11 @@ Effect = Annotated[
     option("--effect", metavar="NAME=VALUE", parser=named_number, help="Something the model leaves out; repeatable."),
 ]
 Debug = Annotated[bool, option("--debug", help="Show the traceback of an error.")]
-FMax = Annotated[float, option("--f-max", metavar="N", parser=positive, help="Strength of a bond, in N.")]
-DeltaMax = Annotated[float, option("--delta-max", metavar="M", parser=positive, help="Critical opening, in m.")]
-TrueFMax = Annotated[float | None, option("--f-max", metavar="N", parser=positive, help="True f_max, in N.")]
+FMax = Annotated[float, option("--f-max", metavar="N", parser=bond_strength, help="Strength of a bond, in N.")]
+DeltaMax = Annotated[float, option("--delta-max", metavar="M", parser=bond_opening, help="Critical opening, in m.")]
+TrueFMax = Annotated[float | None, option("--f-max", metavar="N", parser=bond_strength, help="True f_max, in N.")]
 TrueDeltaMax = Annotated[
-    float | None, option("--delta-max", metavar="M", parser=positive, help="True delta_max, in m.")
+    float | None, option("--delta-max", metavar="M", parser=bond_opening, help="True delta_max, in m.")
 ]
 Grid = Annotated[
     Any,

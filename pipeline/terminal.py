@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
@@ -28,7 +30,13 @@ REMEDY = {
 def exit_codes(debug: bool) -> Iterator[None]:
     """Turn an error into one message on stderr and an exit code: 1, or 130 after an interrupt."""
     try:
-        yield
+        with warnings.catch_warnings():
+            if not debug:
+                warnings.simplefilter("ignore")  # they speak to programmers; what a user must know is an error
+            yield
+    except BrokenPipeError:  # whoever read the output has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is still to be flushed
+        raise typer.Exit(1) from None
     except KeyboardInterrupt as stop:
         _end(stop, f"stopped; {str(stop) or 'give the same command again to go on'}", 130, debug)
     except PipelineError as error:
@@ -51,7 +59,7 @@ def _end(error: BaseException, message: str, code: int, debug: bool) -> None:
 
 def _about_file(error: OSError) -> str:
     """File, reason and remedy of an error of the operating system."""
-    what = str(error.filename or "a file")
+    what = str(error.filename or "standard output, or a file without a name")
     reason = REMEDY.get(error.errno or 0)
     return f"{what}: {reason or error.strerror or error}"
 
@@ -87,22 +95,23 @@ class Display(AbstractContextManager["Display"]):
 
     def failed(self, key: str, error: BaseException) -> None:
         """Say that a simulation failed, and count it."""
-        self._bar.say(f"{key} failed: {error}")
-        self._bar.advance()
+        if self._bar.total > 1:  # the only one is the error that ends the command
+            self._bar.say(f"{key} failed: {error}")
+            self._bar.advance()
 
 
 class _Lines:
     """Progress for a file: a line a simulation."""
 
     def begin(self, total: int, kept: int) -> None:
-        self._total, self._kept, self._count = total, kept, kept
+        self.total, self._kept, self._count = total, kept, kept
         self._start = time.monotonic()
 
     def advance(self) -> None:
         self._count += 1
         each = (time.monotonic() - self._start) / (self._count - self._kept)
-        left = each * (self._total - self._count)
-        self.say(f"simulation {self._count} of {self._total}" + (f", about {_clock(left)} left" if left else ""))
+        left = each * (self.total - self._count)
+        self.say(f"simulation {self._count} of {self.total}" + (f", about {_clock(left)} left" if left else ""))
 
     def say(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -133,7 +142,7 @@ class _Bar(_Lines):
     def advance(self) -> None:
         self._count += 1
         each = (time.monotonic() - self._start) / (self._count - self._kept)
-        left = _clock(each * (self._total - self._count))
+        left = _clock(each * (self.total - self._count))
         self._progress.update(self._task, completed=self._count, left=f"about {left} left")
 
     def say(self, text: str) -> None:

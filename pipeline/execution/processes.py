@@ -11,11 +11,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import shutil
 import signal
+import tempfile
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from functools import partial
+from tempfile import TemporaryDirectory
 from typing import Any, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, concurrent
@@ -42,7 +45,8 @@ class LocalProcesses(Executor):
     """An executor that runs each call in a spawned process, at most `workers` at a time.
 
     A process that is lost fails only its own call, with WorkerLostError. `kill` stops everything at once. Should this
-    process be killed, its workers end by themselves.
+    process be killed, its workers end by themselves. Temporary files of all calls lie in one folder that goes with
+    the executor, so that calls which were stopped leave nothing behind.
 
     Parameters
     ----------
@@ -56,6 +60,7 @@ class LocalProcesses(Executor):
         self._name = f"simulation {id(self):x}"  # of the processes of this executor
         self._lock = threading.Lock()
         self._killed = False
+        self._scratch: TemporaryDirectory[str] | None = None
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Queue the call fn(*args, **kwargs); all of it and its result must be picklable."""
@@ -64,6 +69,8 @@ class LocalProcesses(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Take no more calls; wait for those under way."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        if wait and self._scratch is not None:
+            self._scratch.cleanup()
 
     def kill(self) -> None:
         """End all processes, wait until they are gone, and drop all calls that have not finished."""
@@ -89,7 +96,9 @@ class LocalProcesses(Executor):
         with self._lock:
             if self._killed:
                 raise CancelledError
-            return concurrent.process(name=self._name, context=context)(_serve)(payload)  # type: ignore[call-overload]
+            if self._scratch is None:
+                self._scratch = TemporaryDirectory(prefix="cohesive-bpm-", ignore_cleanup_errors=True)
+            return concurrent.process(name=self._name, context=context)(_serve)(payload, self._scratch.name)  # type: ignore[call-overload]
 
 
 def _epitaph(exitcode: int | None) -> str:
@@ -105,19 +114,21 @@ def _leave_interrupts_to_main() -> None:
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
-def _serve(payload: bytes) -> Any:
-    """In the worker: do one pickled call with single-threaded linear algebra."""
+def _serve(payload: bytes, scratch: str) -> Any:
+    """In the worker: do one pickled call with single-threaded linear algebra; temporary files go to `scratch`."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # compiled code would never come back to a handler of Python's
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(scratch,), daemon=True).start()
+    tempfile.tempdir = scratch
     os.environ.update(dict.fromkeys(THREADS, "1"))  # for libraries that the call loads ...
     call = pickle.loads(payload)
     with threadpool_limits(1):  # ... and for those that are loaded
         return call()
 
 
-def _end_with_parent() -> None:
-    """End this process as soon as the one that started it is gone, however it went."""
+def _end_with_parent(scratch: str) -> None:
+    """End this process as soon as the one that started it is gone, however it went, and tidy up in its place."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
+        shutil.rmtree(scratch, ignore_errors=True)
         os._exit(1)

@@ -36,11 +36,17 @@ class SimulationError(PipelineError, RuntimeError):
         self.total = total
 
     def __str__(self) -> str:
+        if self.total == 1:
+            return "".join(f"{key}: {_reason(error)}" for key, error in self.failures.items())
         by_message: dict[str, list[str]] = {}
         for key, error in self.failures.items():
-            by_message.setdefault(f"{error}" or type(error).__name__, []).append(key)
+            by_message.setdefault(_reason(error), []).append(key)
         head = f"{len(self.failures)} of {self.total} simulations failed, the others are kept"
         return "\n".join([head, *(f"{', '.join(keys)}: {message}" for message, keys in by_message.items())])
+
+
+def _reason(error: BaseException) -> str:
+    return f"{error}" or type(error).__name__
 
 
 def run_all(

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.core.curve import LoadCurve
-from pipeline.core.errors import ConvergenceError, PipelineError
+from pipeline.core.errors import ConvergenceError, PipelineError, StoreError
 from pipeline.core.problem import EnergyBalance, Problem, Solution
 from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.output import read_curve, read_frames, read_reached
 from pipeline.lmp.plugin import open_lammps
 
+ROOM = "; make room there, raise its limits (ulimit -f), or let TMPDIR name another folder"
 ENERGIES = ("external", "stored", "dissipated", "kinetic", "damping")
 
 
@@ -31,14 +32,22 @@ def solve(problem: Problem, folder: Path | None = None) -> Solution:
     ------
     ConvergenceError
         if the gauge did not reach cmod_max
+    StoreError
+        if a file cannot be written or is cut off
     ToolchainError
         if LAMMPS or the compiled style is missing
     """
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        return _solve_in(problem, folder)
-    with tempfile.TemporaryDirectory(prefix="cohesive-bpm-") as temporary:
-        return _solve_in(problem, Path(temporary))
+    try:
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            return _solve_in(problem, folder)
+        with tempfile.TemporaryDirectory(prefix="cohesive-bpm-") as temporary:
+            return _solve_in(problem, Path(temporary))
+    except StoreError:
+        raise
+    except OSError as error:
+        place = folder or tempfile.gettempdir()
+        raise StoreError(f"the files of a simulation cannot be written in {place}: {error.strerror}{ROOM}") from error
 
 
 def _solve_in(problem: Problem, folder: Path) -> Solution:
@@ -56,7 +65,8 @@ def run(folder: Path) -> None:
         os.chdir(folder)
         instance.file(DECK)
     except Exception as error:
-        raise PipelineError(f"LAMMPS stopped in {folder}: {error}") from error
+        remedy = ROOM if "Error writing" in str(error) else ""
+        raise PipelineError(f"LAMMPS stopped in {folder}: {error}{remedy}") from error
     finally:
         os.chdir(home)
         instance.close()

@@ -181,17 +181,20 @@ def read_bundle(folder: Path, fields: Path | None = None, thorough: bool = False
     BundleError
         with every problem of the bundle, each naming file, row or key, the rule and the remedy
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise MissingFileError(f"{folder} is not a folder: `cohesive-bpm new` makes a bundle")
-    bundle, problems = _gathered(folder, fields, thorough)
+    bundle, problems = inspect_bundle(folder, fields, thorough)
     if bundle is None or problems:
         raise BundleError(problems)
     return bundle
 
 
-def _gathered(folder: Path, fields: Path | None, thorough: bool) -> tuple[Bundle | None, list[str]]:
-    """The bundle, None where settings or specimen are faulty, and everything that is wrong."""
+def inspect_bundle(folder: Path, fields: Path | None = None, thorough: bool = False) -> tuple[Bundle | None, list[str]]:
+    """The bundle, None where settings or specimen are faulty, and everything that is wrong.
+
+    Arguments as of `read_bundle`; refuses only what is not a folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise MissingFileError(f"{folder} is not a folder: `cohesive-bpm new` makes a bundle")
     sources, problems = find_sources(folder, fields)
     raw, sections, found = _settings(folder)
     specimen, uncut = cut(sections.get("specimen"), raw.get("specimen"), found)

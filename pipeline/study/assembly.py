@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from pipeline.config import RunSettings, load_settings, run_settings
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Problem
+from pipeline.materials.elastic import central_force_stiffness
 from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.attachment import attach_gauge, attach_grips, gauge_remark
 from pipeline.microstructure.packing import hexagonal_packing
@@ -133,15 +136,27 @@ def read_phases(bundle: Bundle) -> tuple[PhaseMap | None, tuple[str, ...]]:
         raise InputError("experiment.toml: an image of the specimen needs [specimen.image]: mm_per_px and origin_px")
     placement = bundle.image_frame.placement()
     if bundle.labels is not None:
-        phase_map, stones = from_labels(read_labels(bundle.labels), placement)
+        with _told_of(bundle.labels):
+            phase_map, stones = from_labels(read_labels(bundle.labels), placement)
         return phase_map, (f"{stones.count} stones, {stones.small} below 2.36 mm counted as mastic",)
     assert bundle.specimen_image is not None
-    found = segment(grey_levels(read_grey(bundle.specimen_image)), placement)
+    with _told_of(bundle.specimen_image):
+        found = segment(grey_levels(read_grey(bundle.specimen_image)), placement)
     told = (
         f"{found.stones} stones ({found.split} by splitting touching ones, {found.small} below 2.36 mm counted as "
         f"mastic), aggregate {found.aggregate_fraction:.1%} of the photograph, taken as {found.aggregate_is}"
     )
     return found.phase_map, (told,)
+
+
+@contextmanager
+def _told_of(image: Path) -> Iterator[None]:
+    """Begin every refusal with the name of the image it is about."""
+    try:
+        yield
+    except InputError as error:
+        told = str(error)
+        raise InputError(told if told.startswith(image.name) else f"{image.name}: {told}") from error
 
 
 def mixture(bundle: Bundle, radius: float | None = None) -> Mixture:
@@ -175,6 +190,7 @@ def refuse_untold(bundle: Bundle) -> None:
             f"softening = {material.softening!r} with unloading = {material.unloading!r} is not in this version: "
             "use linear and secant"
         )
+    central_force_stiffness(1.0, material.poissons_ratio, material.plane_state, 1.0)  # refuses K^s > 0
     ratio = material.plane_state.central_force_ratio
     shear = (material.shear_strength_ratio, material.shear_opening_ratio)
     if shear != (1.0, 1.0) and abs(material.poissons_ratio - ratio) < 1e-3:

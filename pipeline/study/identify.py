@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +60,7 @@ class Campaign:
     engine: Engine
     store: SimulationStore
     progress: Progress
-    used: set[str] = field(default_factory=set)
+    used: set[str]
 
     def problem(self, f_max: float, delta_max: float) -> Problem:
         """The test at one node of the grid."""
@@ -68,21 +68,27 @@ class Campaign:
 
     def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """Simulate the nodes that the store does not hold; all of them, in order."""
-        problems = [self.problem(*node) for node in nodes]
-        keys = [problem_key(problem, self.engine.label) for problem in problems]
-        wanted = dict(zip(keys, problems, strict=True))
-        names = {k: f"f_max = {f:.4g} N, delta_max = {d:.4g} m" for k, (f, d) in zip(keys, nodes, strict=True)}
+        wanted, names = {}, {}
+        for f_max, delta_max in nodes:
+            problem = self.problem(f_max, delta_max)
+            key = problem_key(problem, self.engine.label)
+            wanted[key], names[key] = problem, f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
         run_all(
             self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress, names=names
         )
-        self.used.update(keys)
-        return [(problem, self._kept(key)) for problem, key in zip(problems, keys, strict=True)]
+        self.used.update(wanted)
+        return self.kept(nodes)
 
-    def _kept(self, key: str) -> Solution:
-        solution = self.store.get(key)
-        if solution is None:
-            raise StoreError(f"{self.store.path(key)} could be written but not be read: give the same command again")
-        return solution
+    def kept(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
+        """The nodes as the store holds them, in order; refuses where one is missing."""
+        found = []
+        for problem in (self.problem(*node) for node in nodes):
+            key = problem_key(problem, self.engine.label)
+            solution = self.store.get(key)
+            if solution is None:
+                raise StoreError(f"{self.store.path(key)} cannot be read back: give the same command again")
+            found.append((problem, solution))
+        return found
 
 
 def identify(
@@ -124,7 +130,7 @@ def identify(
     refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(folder / "simulations")
-    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent())
+    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent(), set())
     found = search(campaign, aim)
     problem, optimum = run_optimum(campaign, found)
     result = identification_result(campaign, found, problem, optimum, time.monotonic() - started)
@@ -236,7 +242,7 @@ def identification_result(
 def identification_arrays(campaign: Campaign, found: Estimate, optimum: Solution) -> dict[str, Any]:
     """The arrays of an identification, by the names of layout `IDENTIFY`."""
     measured, field = campaign.measured, campaign.measured.field
-    runs = campaign.solutions(found.design.nodes())
+    runs = campaign.kept(found.design.nodes())
     shape = found.design.shape
     seen = [at_stations(p, s, campaign.points, measured.cmod) for p, s in runs] if field is not None else None
     return {

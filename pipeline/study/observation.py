@@ -34,7 +34,7 @@ def at_stations(problem: Problem, solution: Solution, points: np.ndarray, statio
 
 
 def nearest_points(field: DisplacementField, wanted: np.ndarray) -> np.ndarray:
-    """Numbers (p,) of the measured points that stand for the wanted ones, nearest first come.
+    """Numbers of the measured points that stand for the wanted ones, each once, in the order of the wanted.
 
     The simulation is then observed at the measured points themselves, so that nothing is interpolated
     across a crack whose path is unknown.
@@ -42,21 +42,27 @@ def nearest_points(field: DisplacementField, wanted: np.ndarray) -> np.ndarray:
     Raises
     ------
     InputError
-        where a wanted point is farther from every measured one than two steps of their grid
+        where no point was ever measured, or a wanted point is farther from every measured one than two
+        steps of their grid
     """
+    known = field.valid.any(axis=0)
+    if known.sum() < 2:
+        raise InputError(
+            f"{int(known.sum())} of the {known.size} points of the displacement fields are valid in any frame: at "
+            "least two are needed; measure again, or compare the load alone with --objective load"
+        )
     distance = np.hypot(*(field.points[:, None] - wanted).transpose(2, 0, 1))
-    seldom = ~field.valid.any(axis=0)
-    distance[seldom] = np.inf
+    distance[~known] = np.inf
     nearest = np.argmin(distance, axis=0)
     apart = distance[nearest, np.arange(len(wanted))]
-    step = _step(field.points)
+    step = _step(field.points[known])
     if apart.max() > 2 * step:
         worst = wanted[np.argmax(apart)] / MM
         raise InputError(
             f"[observation] asks for a point at ({worst[0]:g}, {worst[1]:g}) mm, but the nearest measured point is "
             f"{apart.max() / MM:.3g} mm away: move columns_mm and rows_mm into the measured field"
         )
-    return nearest
+    return np.array(list(dict.fromkeys(nearest.tolist())))
 
 
 def _step(points: np.ndarray) -> float:

@@ -43,8 +43,8 @@ def shows_peak(curve: LoadCurve) -> bool:
 def _refuse_peakless(curve: LoadCurve) -> None:
     if not shows_peak(curve):
         raise InputError(
-            f"load_cmod.csv: the record ends at its peak, with load_n = {curve.load[-1]:.4g} of {curve.load.max():.4g}: "
-            "CMOD stations count from the peak on, give a record that goes on beyond it"
+            f"load_cmod.csv: the record ends at its peak, load_n = {curve.load[-1]:.4g} of {curve.load.max():.4g}: "
+            "stations count from the peak on, give a record that goes on beyond it"
         )
 
 
