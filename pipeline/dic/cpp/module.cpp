@@ -223,6 +223,8 @@ NB_MODULE(_correlate, m) {
         for (std::size_t i = 0; i < n; ++i)
           need(first(i) >= 0 && first(i) <= first(i + 1) && first(i + 1) <= int(candidates.shape(0)),
                "the starts of the candidates must not decrease");
+        for (std::size_t i = 0; i < n; ++i)
+          need(first(i + 1) - first(i) <= int(kMostCandidates), "a point has at most 15 candidates");
         const std::vector<Point> centre = points_of(points);
         const std::vector<Warp> near = from ? warps(*from) : std::vector<Warp>{}, beyond = far ? warps(*far) : near;
         need(near.empty() || (near.size() == n && beyond.size() == n), "one carried warp a point");

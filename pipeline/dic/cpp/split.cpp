@@ -12,16 +12,27 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kLeastFar = 24;     // pixels; smaller parts are not matched
 constexpr int kLeastAffine = 72;  // pixels; smaller far parts keep the gradients they were given
+constexpr double kNone = 0.6;     // share of the clip that a pixel without a match costs
 constexpr double kClean = 20;      // χ² of the score test that needs no wider margin
 constexpr double kSurest = 1e-3;  // gradients are never taken for better known than this
 constexpr double kInnermost = 0.5, kOutermost = 4.5;  // px, of the band along the line that may be left out
 
-// Maps of clipped cost, one row a candidate; the last row stands for pixels that nothing matches.
+// Maps of clipped cost, the candidates of one pixel side by side in lanes; the last one stands for pixels that nothing
+// matches.
 struct Maps {
   int rows, pixels;
   std::vector<float> cost;
-  float *row(int k) { return &cost[static_cast<std::size_t>(k) * pixels]; }
-  const float *row(int k) const { return &cost[static_cast<std::size_t>(k) * pixels]; }
+  Maps(int rows, int pixels) : rows(rows), pixels(pixels), cost(static_cast<std::size_t>(pixels) * kLanes) {}
+  float &at(int k, int i) { return cost[static_cast<std::size_t>(i) * kLanes + k]; }
+  float at(int k, int i) const { return cost[static_cast<std::size_t>(i) * kLanes + k]; }
+  void fill(int k, float value) {
+    for (int i = 0; i < pixels; ++i) at(k, i) = value;
+  }
+  double total(int k) const {
+    double s = 0;
+    for (int i = 0; i < pixels; ++i) s += at(k, i);
+    return s;
+  }
 };
 
 struct Cut {
@@ -30,25 +41,21 @@ struct Cut {
   double cost = std::numeric_limits<double>::max();
 };
 
-// Where the pixel beyond the border of the picture lies the cost is that of no match.
+// The map of one candidate; a motion that leaves the picture matches nothing.
 void fill_cost(const Pixels &p, const Picture &current, Point centre, const Candidate &c, double variance, double clip,
-               Bench &bench, float *cost) {
-  if (misfit(p, current, centre, c.warp, c.gain, c.offset, bench) < 0) {
-    std::fill_n(cost, p.count, float(clip));
-    return;
-  }
+               Bench &bench, Maps &maps, int k) {
+  if (misfit(p, current, centre, c.warp, c.gain, c.offset, bench) < 0) return maps.fill(k, float(clip));
   for (int i = 0; i < p.count; ++i)
-    cost[i] = std::min(float(bench.error[i] * bench.error[i] / variance), float(clip));
+    maps.at(k, i) = std::min(float(bench.error[i] * bench.error[i] / variance), float(clip));
 }
 
 // Sums of every map over strips along the direction (nx, ny).
-void sum_strips(const Pixels &p, const Maps &maps, double angle, double reach, double width, int count,
-                std::vector<float> &strips) {
-  const float nx = float(std::cos(angle)), ny = float(std::sin(angle));
-  strips.assign(static_cast<std::size_t>(count) * maps.rows, 0.0f);
+DIC_CLONES void sum_strips(const Pixels &p, const float *cost, float nx, float ny, float reach, float width,
+                           float *strips) {
+  const float scale = 1 / width;
   for (int i = 0; i < p.count; ++i) {
-    const int s = int((nx * p.xi[i] + ny * p.eta[i] + reach) / width);
-    for (int k = 0; k < maps.rows; ++k) strips[static_cast<std::size_t>(k) * count + s] += maps.row(k)[i];
+    const int s = int((nx * p.xi[i] + ny * p.eta[i] + reach) * scale);
+    *lanes(strips + s * kLanes) += *lanes(cost + i * kLanes);
   }
 }
 
@@ -59,18 +66,19 @@ Cut best_cut(const Pixels &p, const Maps &maps, int half, int angles, double wid
   const double reach = half * std::sqrt(2.0) + 1;
   const int count = int(2 * reach / width) + 1;
   Cut best;
-  std::vector<double> below(maps.rows), total(maps.rows);
+  double below[kLanes], total[kLanes];
   for (int a = 0; a < angles; ++a) {
     const double angle = a * kPi / angles;
-    sum_strips(p, maps, angle, reach, width, count, strips);
-    for (int k = 0; k < maps.rows; ++k) {
-      total[k] = below[k] = 0;
-      for (int s = 0; s < count; ++s) total[k] += strips[static_cast<std::size_t>(k) * count + s];
-    }
+    strips.assign(static_cast<std::size_t>(count + 1) * kLanes, 0.0f);
+    sum_strips(p, maps.cost.data(), float(std::cos(angle)), float(std::sin(angle)), float(reach), float(width),
+               strips.data());
+    std::fill_n(below, kLanes, 0.0), std::fill_n(total, kLanes, 0.0);
+    for (int s = 0; s <= count; ++s)
+      for (int k = 0; k < maps.rows; ++k) total[k] += strips[static_cast<std::size_t>(s) * kLanes + k];
     for (int s = 0; s + 1 < count; ++s) {
       int low = 0, high = 0;
       for (int k = 0; k < maps.rows; ++k) {
-        below[k] += strips[static_cast<std::size_t>(k) * count + s];
+        below[k] += strips[static_cast<std::size_t>(s) * kLanes + k];
         if (below[k] < below[low]) low = k;
         if (total[k] - below[k] < total[high] - below[high]) high = k;
       }
@@ -93,12 +101,12 @@ void distances(const Pixels &p, const Line &line, double sign, std::vector<float
 }
 
 // The band along the line that does not match its own side: the gap, its blur and what a bent line leaves over.
-double band(const std::vector<float> &distance, const float *cost, double expected) {
+double band(const std::vector<float> &distance, const Maps &maps, int k, double expected) {
   constexpr int bins = int(kOutermost - kInnermost) + 1;
   double sum[bins] = {}, number[bins] = {};
   for (std::size_t i = 0; i < distance.size(); ++i) {
     const int bin = int(std::floor(-distance[i]));
-    if (bin >= 0 && bin < bins) sum[bin] += cost[i], number[bin] += 1;
+    if (bin >= 0 && bin < bins) sum[bin] += maps.at(k, int(i)), number[bin] += 1;
   }
   double margin = kInnermost;
   for (int b = 0; b < bins; ++b)
@@ -163,12 +171,6 @@ bool match_clean(const Part &part, const Line &line, double sign, double margin,
   return true;
 }
 
-double total(const float *cost, int n) {
-  double s = 0;
-  for (int i = 0; i < n; ++i) s += cost[i];
-  return s;
-}
-
 }  // namespace
 
 SplitResult split(const Picture &reference, const Picture &current, Point centre,
@@ -176,21 +178,21 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
                   const Warp *from, const Warp *far_from, const Line *known, SplitBench &work) {
   SplitResult r;
   const int half = settings.fit.half;
-  if (candidates.empty() || !gather(reference, centre, half, from, far_from, known, work.all)) return r;
+  if (candidates.empty() || candidates.size() > kMostCandidates || !gather(reference, centre, half, from, far_from, known, work.all)) return r;
   const int n = work.all.count;
-  Maps maps{int(candidates.size()) + 1, n, {}};
-  maps.cost.resize(static_cast<std::size_t>(maps.rows) * n);
+  Maps maps(int(candidates.size()) + 1, n);
   r.single = std::numeric_limits<double>::max();
   for (int k = 0; k + 1 < maps.rows; ++k) {
-    fill_cost(work.all, current, centre, candidates[k], variance, settings.clip, work.bench, maps.row(k));
-    r.single = std::min(r.single, total(maps.row(k), n));
+    fill_cost(work.all, current, centre, candidates[k], variance, settings.clip, work.bench, maps, k);
+    r.single = std::min(r.single, maps.total(k));
   }
   const int none = maps.rows - 1;
-  std::fill_n(maps.row(none), n, float(0.6 * settings.clip));
+  maps.fill(none, float(kNone * settings.clip));
   Cut cut = best_cut(work.all, maps, half, 24, 1.0, -1, -1, work.strips);
   if (cut.near == none || cut.near < 0) return r;
   Candidate near = candidates[cut.near], far = cut.far == none ? candidates[cut.near] : candidates[cut.far];
-  Maps two{3, n, std::vector<float>(static_cast<std::size_t>(3) * n, float(0.6 * settings.clip))};
+  Maps two(3, n);
+  for (int k = 0; k < 3; ++k) two.fill(k, float(kNone * settings.clip));
   const Part part{current, centre, settings.fit, work};
   double near_margin = 1.5, far_margin = 1.5;
   bool far_known = cut.far != none;
@@ -203,13 +205,13 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
     near = seen(r.near);
     r.far_matched = far_known && match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond);
     if (r.far_matched) far = seen(r.far);
-    fill_cost(work.all, current, centre, near, variance, settings.clip, work.bench, two.row(0));
-    if (far_known) fill_cost(work.all, current, centre, far, variance, settings.clip, work.bench, two.row(1));
+    fill_cost(work.all, current, centre, near, variance, settings.clip, work.bench, two, 0);
+    if (far_known) fill_cost(work.all, current, centre, far, variance, settings.clip, work.bench, two, 1);
     cut = best_cut(work.all, two, half, 48, 0.5, 0, far_known ? 1 : 2, work.strips);
     distances(work.all, cut.line, 1, work.distance);
-    near_margin = band(work.distance, two.row(0), 1.0);
+    near_margin = band(work.distance, two, 0, 1.0);
     distances(work.all, cut.line, -1, work.distance);
-    far_margin = band(work.distance, two.row(1), 1.0);
+    far_margin = band(work.distance, two, 1, 1.0);
     const double turn = std::abs(std::remainder(cut.line.angle - before.angle, 2 * kPi));
     if (round > 0 && turn < 0.08 && std::abs(cut.line.offset - before.offset) < 0.6) break;
   }

@@ -1,10 +1,13 @@
 // A subset cut by a straight line: the line is searched over all angles and offsets, each part has its own warp.
 #pragma once
+#include <cstddef>
 #include <vector>
 
 #include "screen.hpp"
 
 namespace dic {
+
+constexpr std::size_t kMostCandidates = 15;
 
 // A motion seen near the subset, with the brightness it came with and where it was seen from the centre; NaN where
 // it is the subset's own.
