@@ -14,7 +14,7 @@ class View:
     """Where the camera stood.
 
     Pixel (0, 0) is the centre of the top-left pixel; x = (column − c₀)·scale, y = −(row − r₀)·scale, then turned
-    counter-clockwise; a mirrored view flips x before the turn.
+    counter-clockwise; last, for a view of the other face, x becomes −x.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ class View:
 
     def _matrix(self) -> np.ndarray:
         c, s = np.cos(self.rotation), np.sin(self.rotation)
-        flip = np.diag([-1.0 if self.mirror else 1.0, -1.0])
-        return self.metre_per_px * np.array([[c, -s], [s, c]]) @ flip
+        face = np.diag([-1.0 if self.mirror else 1.0, 1.0])
+        return self.metre_per_px * face @ np.array([[c, -s], [s, c]]) @ np.diag([1.0, -1.0])
 
     def point(self, px: np.ndarray) -> np.ndarray:
         """Specimen coordinates (n, 2) in m of pixels (n, 2)."""

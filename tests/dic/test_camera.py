@@ -19,7 +19,11 @@ def test_y_points_up_and_the_origin_may_lie_outside():
 def test_a_quarter_turn():
     view = View(1e-3, rotation=np.pi / 2)
     np.testing.assert_allclose(view.point([[3.0, 0.0]]), [[0.0, 3e-3]], atol=1e-15)  # counter-clockwise
-    np.testing.assert_allclose(View(1e-3, mirror=True).vector([[3.0, 1.0]]), [[-3e-3, -1e-3]], atol=1e-15)
+
+
+def test_the_other_face_is_mirrored_in_x_last():
+    plain, other = (View(1e-3, (5.0, 6.0), 0.7, mirror) for mirror in (False, True))
+    np.testing.assert_allclose(other.point([[3.0, 1.0]]), plain.point([[3.0, 1.0]]) * [-1, 1], atol=1e-15)
 
 
 @given(number, number, number, number, st.floats(-4, 4), st.booleans())
