@@ -10,7 +10,7 @@ from pipeline.core.units import GPA, MM
 from pipeline.lmp.modes import lowest_modes
 from pipeline.materials.elastic import Plane
 from pipeline.materials.mixture import Mixture
-from pipeline.twin.calibration import calibrated_factors, check_factors
+from pipeline.twin.calibration import PATH, calibrated_factors, check_factors
 from pipeline.twin.network import irregular_network
 from pipeline.twin.problem import Truth, one_phase, twin_problem
 
@@ -27,7 +27,7 @@ def test_cut_bonds_carry_strength_and_energy_of_the_lattice(seed: int) -> None:
 def test_factors_are_the_closed_forms() -> None:
     factors = calibrated_factors()
     assert factors.strength == 1
-    assert factors.opening * (4 / np.pi) == pytest.approx(2 / np.sqrt(3), rel=1e-15)  # round-off
+    assert factors.opening / PATH * (4 / np.pi) == pytest.approx(2 / np.sqrt(3), rel=1e-15)  # round-off
 
 
 def test_homogeneous_beam_is_as_stiff_as_on_the_lattice() -> None:
