@@ -9,25 +9,20 @@ import numpy as np
 
 from pipeline.core.problem import CohesiveLaw, Problem
 from pipeline.equilibrium.constraints import Constraints
-from pipeline.equilibrium.network import Network, whole_network
+from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
 
 
 class Model(Protocol):
-    """A specimen in the variables it is solved in."""
+    """A specimen in the variables it is solved in; `gauge` (q,) is ∂CMOD/∂q, `gauge_drive` ∂CMOD/∂s."""
 
     @property
     def network(self) -> Network: ...
     @property
     def law(self) -> CohesiveLaw: ...
     @property
-    def gauge(self) -> np.ndarray:
-        """∂CMOD/∂q (q,)."""
-        ...
-
+    def gauge(self) -> np.ndarray: ...
     @property
-    def gauge_drive(self) -> float:
-        """∂CMOD/∂s."""
-        ...
+    def gauge_drive(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -36,29 +31,22 @@ class WholeModel:
 
     Parameters
     ----------
-    problem : Problem
-    network : Network
+    law : CohesiveLaw
+    network : SmallNetwork or FiniteNetwork
     constraints : Constraints
-    gauge : (q,) array, ∂CMOD/∂q; gauge_drive : float, ∂CMOD/∂s
+    gauge : (q,) array, ∂CMOD/∂q
+    gauge_drive : float, ∂CMOD/∂s
     """
 
-    problem: Problem
-    network: Network
+    law: CohesiveLaw
+    network: SmallNetwork | FiniteNetwork
     constraints: Constraints
     gauge: np.ndarray
     gauge_drive: float
 
-    @property
-    def law(self) -> CohesiveLaw:
-        return self.problem.law
-
     def displacement(self, free: np.ndarray, machine: float) -> np.ndarray:
         """Displacements (n, 2), m, of all particles."""
         return self.constraints.displacement(free, machine)
-
-    def openings(self, free: np.ndarray, machine: float) -> np.ndarray:
-        """Openings (m,), m, of all bonds."""
-        return self.network.opening(free, machine)
 
 
 def whole_model(problem: Problem) -> WholeModel:
@@ -66,7 +54,8 @@ def whole_model(problem: Problem) -> WholeModel:
     network, constraints = whole_network(problem)
     weight = np.zeros(constraints.drive.size)
     np.add.at(weight, 2 * problem.gauge.index, problem.gauge.weight)
-    return WholeModel(problem, network, constraints, constraints.expand.T @ weight, float(weight @ constraints.drive))
+    drive = float(weight @ constraints.drive)
+    return WholeModel(problem.law, network, constraints, constraints.expand.T @ weight, drive)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,10 @@ class Network(Protocol):
         """Stiffness (q, q), N/m, of bonds with stiffness `weight` (m,), N/m."""
         ...
 
+    def energy(self, free: np.ndarray, machine: float) -> float:
+        """Elastic energy, J, of what is condensed into the network; 0 where nothing is."""
+        ...
+
 
 @dataclass(frozen=True)
 class SmallNetwork:
@@ -50,6 +54,14 @@ class SmallNetwork:
 
     def stiffness(self, weight: np.ndarray, free: np.ndarray, machine: float) -> sparse.csc_array:
         return (self.transpose @ (self.jacobian * weight[:, None])).tocsc()
+
+    def energy(self, free: np.ndarray, machine: float) -> float:
+        return 0.0
+
+    def part(self, bonds: np.ndarray, variables: np.ndarray) -> SmallNetwork:
+        """Some of the bonds, in some of the variables; no others may move them."""
+        jacobian = self.jacobian[bonds][:, variables].tocsr()
+        return SmallNetwork(jacobian, jacobian.T.tocsr(), self.drive[bonds])
 
 
 @dataclass(frozen=True)
@@ -84,6 +96,9 @@ class FiniteNetwork:
         """Material part only: the geometric part, force over length, is about 1e-3 of it and may be negative."""
         jacobian, _ = _jacobian(self._direction(free, machine), self.pairs, self.constraints)
         return (jacobian.T @ (jacobian * weight[:, None])).tocsc()
+
+    def energy(self, free: np.ndarray, machine: float) -> float:
+        return 0.0
 
     def _relative(self, free: np.ndarray, machine: float) -> np.ndarray:
         moved = self.constraints.displacement(free, machine)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.core.curve import LoadCurve
 from pipeline.core.problem import EnergyBalance, Problem, Solution
-from pipeline.equilibrium.model import State, WholeModel
+from pipeline.equilibrium.model import State
+
+Fields = Callable[[State], np.ndarray]
 
 
 @dataclass
@@ -27,21 +30,23 @@ class Record:
     error: float = 0.0
     iterations: int = 0
 
-    def add(self, before: State | None, state: State, model: WholeModel) -> None:
-        """Take in the next equilibrium and interpolate the stations between it and the one before."""
+    def add(self, state: State, before: State | None, fields: Fields) -> None:
+        """Take in the next equilibrium; interpolate the stations between it and the one before.
+
+        `fields` gives the displacements (n, 2), m, of all particles in a state.
+        """
         self.rows.append((state.machine, state.cmod, state.load))
         self.residual = max(self.residual, state.residual)
         self.error = max(self.error, state.error)
         self.iterations += state.iterations
-        if before is not None:
-            self._interpolate(before, state, model)
-
-    def _interpolate(self, before: State, state: State, model: WholeModel) -> None:
-        stations = self.problem.stations
-        while len(self.frames) < stations.size and stations[len(self.frames)] <= state.cmod * (1 + 1e-9):
-            share = (stations[len(self.frames)] - before.cmod) / (state.cmod - before.cmod)
-            ends = [model.displacement(s.free, s.machine) for s in (before, state)]
-            self.frames.append((1 - share) * ends[0] + share * ends[1])
+        stations, k = self.problem.stations, len(self.frames)
+        passed = np.searchsorted(stations, state.cmod * (1 + 1e-9), side="right")
+        if before is None or passed <= k:
+            return
+        first, last = fields(before), fields(state)
+        for station in stations[k:passed]:
+            share = (station - before.cmod) / (state.cmod - before.cmod)
+            self.frames.append((1 - share) * first + share * last)
 
     def curve(self) -> LoadCurve:
         """Load against CMOD; time counts at the CMOD rate of the test."""

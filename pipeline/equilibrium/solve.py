@@ -9,7 +9,9 @@ import numpy as np
 
 from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.core.problem import Problem, Solution
-from pipeline.equilibrium.model import whole_model
+from pipeline.equilibrium import active
+from pipeline.equilibrium.condensation import CondensedModel, condense
+from pipeline.equilibrium.model import State, WholeModel, whole_model
 from pipeline.equilibrium.path import Increments, Path
 from pipeline.equilibrium.record import Record
 from pipeline.equilibrium.step import Stepper
@@ -23,13 +25,14 @@ def solve(
     tolerance: float = 1e-3,
     increments: Increments | None = None,
     limit: int = 400,
+    condensed: bool = True,
     strict: bool = True,
     progress: Progress | None = None,
 ) -> Solution:
     """The quasi-static solution of a fracture test.
 
     At every machine displacement the incremental potential is minimised; full fields at the problem's
-    stations are interpolated linearly between two increments that lie close to them.
+    stations are interpolated linearly between the two increments around them, one of which ends close by.
 
     Parameters
     ----------
@@ -37,6 +40,7 @@ def solve(
     tolerance : float; largest force out of balance, as a share of the smallest f_max of the specimen
     increments : Increments; how far one increment opens the mouth
     limit : int; iterations after which an increment counts as failed and is halved
+    condensed : bool; eliminate what stays elastic (exact, and checked), under small kinematics
     strict : bool; False: a path that ends early is returned, not raised, with `converged` False
     progress : called with the share of the CMOD range that is done
 
@@ -47,27 +51,73 @@ def solve(
     """
     started = time.process_time()
     _refuse(problem, tolerance)
-    model = whole_model(problem)
-    stepper = Stepper(model, limit=limit)
-    path = Path(stepper, problem.cmod_max, problem.stations, increments or Increments())
-    record = Record(problem)
-    before, state = path.start()
-    stepper.tolerance = tolerance * _reference_force(problem, state.opening)
-    record.add(None, before, model)
-    record.add(before, state, model)
+    journey = _Journey(problem, tolerance, increments or Increments(), limit, condensed)
     failure = None
     try:
-        for following in path.follow(before, state):
-            record.add(state, following, model)
-            state = following
+        while not journey.path.done(journey.state):
+            journey.step()
             if progress is not None:
-                progress(min(state.cmod / problem.cmod_max, 1.0))
+                progress(min(journey.state.cmod / problem.cmod_max, 1.0))
     except ConvergenceError as stopped:
-        if strict or len(record.rows) < 3:  # two rows are no curve
+        if strict or len(journey.record.rows) < 3:  # two rows are no curve
             raise
         failure = str(stopped)
-    message = failure or _message(path, state.cmod)
-    return record.solution(state, time.process_time() - started, failure is None, message)
+    message = failure or journey.message()
+    seconds = time.process_time() - started
+    return journey.record.solution(journey.whole_state(), seconds, failure is None, message)
+
+
+class _Journey:
+    """A path, the model it is followed on, which may grow on the way, and what is recorded."""
+
+    def __init__(self, problem: Problem, tolerance: float, increments: Increments, limit: int, condensed: bool):
+        self.whole = whole_model(problem)
+        elastic = Stepper(self.whole).elastic()
+        self.record = Record(problem)
+        self.model: WholeModel | CondensedModel = self.whole
+        stepper = Stepper(self.whole, limit=limit)
+        self.path = Path(stepper, problem.cmod_max, problem.stations, increments)
+        self.before, self.state = self.path.begin(elastic)
+        stepper.tolerance = tolerance * _reference_force(problem, self.state.opening)
+        for state, before in ((self.before, None), (self.state, self.before)):
+            self.record.add(state, before, self.fields)
+        chosen = active.strip(problem)
+        if condensed and active.pays(problem, chosen):
+            self._adopt(chosen)
+
+    def step(self) -> None:
+        """One increment; repeated with a larger model where a bond outside it would have been damaged."""
+        found = self.path.next(self.before, self.state)
+        if isinstance(self.model, CondensedModel) and self.model.weak(found, 1.0).any():
+            self._adopt(self.model.active | self.model.weak(found, active.LIKELY))
+            return
+        self.record.add(found, self.state, self.fields)
+        self.before, self.state = self.state, found
+
+    def fields(self, state: State) -> np.ndarray:
+        """Displacements (n, 2), m, of all particles in a state of the model in use."""
+        free = state.free if isinstance(self.model, WholeModel) else self.model.complete(state.free, state.machine)
+        return self.whole.displacement(free, state.machine)
+
+    def whole_state(self) -> State:
+        """The last state, with all bonds and variables."""
+        return self._expanded(self.state)
+
+    def message(self) -> str:
+        """One sentence on how the run ended."""
+        jumps = self.path.jumps
+        leaps = f"; the crack jumped {jumps} times, energy was set free" if jumps else ""
+        return f"equilibrium followed to CMOD = {self.state.cmod * 1e3:.4g} mm{leaps}"
+
+    def _expanded(self, state: State) -> State:
+        return state if isinstance(self.model, WholeModel) else self.model.expand(state)
+
+    def _adopt(self, chosen: np.ndarray) -> None:
+        """Go on with the bonds (m,) bool active, all others condensed."""
+        larger = condense(self.whole, chosen)
+        self.before, self.state = (larger.reduce(self._expanded(s)) for s in (self.before, self.state))
+        self.model = larger
+        self.path.stepper = self.path.stepper.on(larger)
 
 
 def _refuse(problem: Problem, tolerance: float) -> None:
@@ -83,8 +133,3 @@ def _reference_force(problem: Problem, opening: np.ndarray) -> float:
     """The smallest f_max; without any, the largest force of the first elastic increment."""
     finite = problem.law.f_max[np.isfinite(problem.law.f_max)]
     return float(finite.min()) if finite.size else float(np.abs(problem.law.k_n * opening).max())
-
-
-def _message(path: Path, cmod: float) -> str:
-    jumps = f"; {path.jumps} jumps of the crack at constant machine displacement" if path.jumps else ""
-    return f"equilibrium followed to CMOD = {cmod * 1e3:.4g} mm{jumps}"

@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.equilibrium.minimise import Minimum, minimise
 from pipeline.equilibrium.model import Model, State
-from pipeline.equilibrium.potential import Potential, SecantPreconditioner
+from pipeline.equilibrium.potential import Potential, SecantPreconditioner, factorise_elastic
 
 
 @dataclass
 class Stepper:
-    """Finds equilibria of one model.
+    """Finds equilibria of one model; keeps its factorised stiffness as long as it serves.
 
     Parameters
     ----------
     model : Model
     tolerance : float, N; largest force out of balance
     limit : int; iterations after which a minimisation counts as failed
+    patience : int; iterations after which a minimisation renews its factorisation
+    endurance : int; iterations after which the next minimisation begins with a new one
     """
 
     model: Model
     tolerance: float = np.inf
     limit: int = 400
+    patience: int = 25
+    endurance: int = 40
+    _preconditioner: SecantPreconditioner = field(default_factory=SecantPreconditioner, repr=False)
+    _spent: int = field(default=0, repr=False)
+
+    def on(self, model: Model) -> Stepper:
+        """The same stepper for another model."""
+        return Stepper(model, self.tolerance, self.limit, self.patience, self.endurance)
 
     def elastic(self) -> State:
         """The linear elastic state at a machine displacement of 1 m: only a direction and a compliance."""
         zero = np.zeros(self.model.gauge.size)
-        bonds = np.zeros(self.model.law.k_n.size)
         network, stiffness = self.model.network, self.model.law.k_n
         tiny = 1e-9  # a motion so small that true lengths are linear in it
         pull, _ = network.pull(stiffness * network.opening(zero, tiny), zero, 0.0)
-        preconditioner = self._preconditioner(Potential(network, self.model.law, bonds), 0.0)
-        preconditioner.renew(zero)
-        free = -preconditioner.solve(pull) / tiny
+        free = -factorise_elastic(network.stiffness(stiffness, zero, 0.0)).solve(pull) / tiny
         opening = network.opening(tiny * free, tiny) / tiny
         _, load = network.pull(stiffness * opening, zero, 0.0)
         return State(free, 1.0, load, self._cmod(free, 1.0), opening, np.maximum(opening, 0.0), load / 2)
@@ -66,13 +73,21 @@ class Stepper:
         self, reached: np.ndarray, guess: np.ndarray, machine: float, tolerance: float, constraint: np.ndarray | None
     ) -> tuple[Minimum, Potential]:
         potential = Potential(self.model.network, self.model.law, reached)
-        preconditioner = self._preconditioner(potential, machine)
-        preconditioner.renew(guess)
-        slope = lambda free: potential.gradient(free, machine)  # noqa: E731
-        return minimise(slope, preconditioner, guess, tolerance, constraint, self.limit), potential
-
-    def _preconditioner(self, potential: Potential, machine: float) -> SecantPreconditioner:
-        return SecantPreconditioner(potential, machine)
+        self._preconditioner.move(potential, machine)
+        if self._preconditioner.factor is None or self._spent >= self.endurance:
+            self._preconditioner.renew(guess)
+            self._spent = 0
+        found = minimise(
+            lambda free: potential.gradient(free, machine),
+            self._preconditioner,
+            guess,
+            tolerance,
+            constraint,
+            self.limit,
+            self.patience,
+        )
+        self._spent += found.iterations
+        return found, potential
 
     def _state(self, found: Minimum, potential: Potential, machine: float) -> State:
         gradient, load, opening = potential.state(found.at, machine)
@@ -84,7 +99,7 @@ class Stepper:
             cmod=self._cmod(found.at, machine),
             opening=opening,
             reached=np.maximum(opening, potential.reached),
-            energy=potential.energy(opening),
+            energy=potential.energy(found.at, machine, opening),
             residual=float(np.abs(gradient).max()),
             error=float(np.linalg.norm(found.step)) / size if size else 0.0,
             iterations=found.iterations,

@@ -40,6 +40,10 @@ class LinearSoftening:
         object.__setattr__(self, "delta_peak", self.f_max / self.k_n)
         _refuse_brittle(self.delta_max, self.delta_peak)
 
+    def of(self, bonds: np.ndarray) -> LinearSoftening:
+        """The law of some of the bonds: numbers (k,) or bools (m,)."""
+        return LinearSoftening(self.k_n[bonds], self.f_max[bonds], self.delta_max[bonds])
+
     def reached(self, opening: np.ndarray, reached: np.ndarray) -> np.ndarray:
         """Largest opening seen (m,), m, after the bonds were opened by `opening` (m,), m."""
         return np.maximum(opening, reached)
