@@ -190,7 +190,7 @@ def _damage(folder: Path, problem: Problem, solution: Solution) -> Figure:
 
 
 def _picture(folder: Path, name: str, draw: Draw, caption: str, wide: bool = False) -> Figure:
-    image = png(draw, **WIDE) if wide else png(draw)
+    image = png(draw, width=WIDE["width"], height=WIDE["height"]) if wide else png(draw)
     write_atomically(folder / f"{name}.png", image)
     return Figure(image, caption, wide)
 

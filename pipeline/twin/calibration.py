@@ -5,14 +5,15 @@ sliding (with K^s = 0 free halves slide, and what they spend is no property of t
 inclined by φ to the normal of the line opens by w·cos φ. Then, per unit length and thickness,
 
 - strength: Σ facet·|cos φ| is the projected length, 1 for every network of facets, as for the hexagonal lattice;
-- energy: Σ facet is the length of a staircase of facets. It is 2/√3 along a row of the hexagonal lattice, where δ_max is
-  defined (angle factor 1), and 4/π for an isotropic network (Cauchy–Crofton).
+- energy: Σ facet is the length of a staircase of facets. It is 2/√3 along a row of the hexagonal lattice, where δ_max
+  is defined (angle factor 1), and 4/π for an isotropic network (Cauchy–Crofton).
 
 So f_max needs no factor, and δ_max the factor (2/√3)/(4/π) = π/(2√3) on a straight cut. A crack that finds its own way
-spends more in a disordered network than along the rows of a lattice: its faces interlock and bonds across it stay. That
-excess, `PATH`, was measured on two-phase reference sections (graded sections of seeds 100 to 107, SE(B), r = 0.6 mm, rows
-along the crack, pitch 1.14 mm), where it brings the work of both to one mean; single sections differ by a tenth. The stiffness factor makes up for what a disordered
-network gives way beyond uniform strain; it was measured on homogeneous networks (`tests/twin`).
+spends more in a disordered network than along the rows of a lattice: its faces interlock, and bonds across it stay.
+`PATH` makes up for that excess. It was measured on two-phase reference sections (graded sections of seeds 100 to 107,
+SE(B), r = 0.6 mm, rows along the crack, pitch 1.14 mm), where it brings the mean area under load–CMOD of both to one
+value; single sections differ by a tenth. The stiffness factor makes up for what a disordered network gives way beyond
+uniform strain; it was measured on homogeneous networks (`tests/twin`).
 """
 
 from __future__ import annotations
