@@ -15,16 +15,19 @@ import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
+from multiprocessing import resource_tracker
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, concurrent
 from threadpoolctl import threadpool_limits
 
-from pipeline.core.errors import InputError, PipelineError
+from pipeline.core.errors import InputError, PipelineError, StoreError
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -74,31 +77,51 @@ class LocalProcesses(Executor):
 
     def kill(self) -> None:
         """End all processes, wait until they are gone, and drop all calls that have not finished."""
-        with self._lock:
-            self._killed = True
-        self.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
-            if process.name == self._name:
-                process.kill()
-                process.join()
-        self.shutdown()
+        with interrupts_ignored():
+            with self._lock:
+                self._killed = True
+            self.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                if process.name == self._name:
+                    process.kill()
+                    process.join()
+            self.shutdown()
 
     def _run(self, call: Callable[[], T]) -> T:
         try:
-            return self._start(pickle.dumps(call)).result()
+            return self._start(self._lay_down(call)).result()
         except ProcessExpired as error:
             raise WorkerLostError(_epitaph(error.exitcode)) from error
         except BrokenPipeError as error:
             raise WorkerLostError("the process of this simulation was lost while it started") from error
 
-    def _start(self, payload: bytes) -> Future[Any]:
+    def _lay_down(self, call: Callable[[], T]) -> Path:
+        """Write a call to a file: through the pipe of its start a process gets only as much as the pipe holds.
+
+        More would be waited for until the process reads it, and so for ever where it is lost before.
+        """
+        try:
+            with self._lock:
+                if self._scratch is None:
+                    self._scratch = TemporaryDirectory(prefix="cohesive-bpm-", ignore_cleanup_errors=True)
+            handle, name = tempfile.mkstemp(suffix=".call", dir=self._scratch.name)
+            with open(handle, "wb") as file:
+                pickle.dump(call, file)
+        except OSError as error:
+            place = tempfile.gettempdir()
+            raise StoreError(
+                f"{place}: {error.strerror}: make room there, or let TMPDIR name another folder"
+            ) from error
+        return Path(name)
+
+    def _start(self, call: Path) -> Future[Any]:
         context = multiprocessing.get_context("spawn")  # MPI and threads do not survive a fork
         with self._lock:
             if self._killed:
                 raise CancelledError
-            if self._scratch is None:
-                self._scratch = TemporaryDirectory(prefix="cohesive-bpm-", ignore_cleanup_errors=True)
-            return concurrent.process(name=self._name, context=context)(_serve)(payload, self._scratch.name)  # type: ignore[call-overload]
+            resource_tracker.ensure_running()  # its start lets interrupts through again
+            _leave_interrupts_to_main()
+            return concurrent.process(name=self._name, context=context)(_serve)(call)  # type: ignore[call-overload]
 
 
 def _epitaph(exitcode: int | None) -> str:
@@ -109,23 +132,37 @@ def _epitaph(exitcode: int | None) -> str:
     return f"the process of this simulation was killed by signal {-exitcode}{hint}"
 
 
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Let nothing, and nobody who presses Ctrl-C twice, stop the tidying up after the first."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
 def _leave_interrupts_to_main() -> None:
     """Ctrl-C reaches every process of a terminal: processes started from this thread inherit that it is blocked."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
-def _serve(payload: bytes, scratch: str) -> Any:
-    """In the worker: do one pickled call with single-threaded linear algebra; temporary files go to `scratch`."""
+def _serve(file: Path) -> Any:
+    """In the worker: do the call of a file with single-threaded linear algebra; temporary files lie beside it."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # compiled code would never come back to a handler of Python's
-    threading.Thread(target=_end_with_parent, args=(scratch,), daemon=True).start()
-    tempfile.tempdir = scratch
+    threading.Thread(target=_end_with_parent, args=(file.parent,), daemon=True).start()
+    tempfile.tempdir = str(file.parent)
     os.environ.update(dict.fromkeys(THREADS, "1"))  # for libraries that the call loads ...
-    call = pickle.loads(payload)
+    call = pickle.loads(file.read_bytes())
+    file.unlink()
     with threadpool_limits(1):  # ... and for those that are loaded
         return call()
 
 
-def _end_with_parent(scratch: str) -> None:
+def _end_with_parent(scratch: Path) -> None:
     """End this process as soon as the one that started it is gone, however it went, and tidy up in its place."""
     parent = multiprocessing.parent_process()
     if parent is not None:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from pipeline.core.errors import PipelineError
 from pipeline.core.problem import Problem, Solution
-from pipeline.execution.processes import LocalProcesses, WorkerLostError
+from pipeline.execution.processes import LocalProcesses, WorkerLostError, interrupts_ignored
 from pipeline.execution.progress import Progress, Silent
 
 Simulate = Callable[[Problem], Solution]
@@ -88,8 +88,9 @@ def run_all(
     try:
         failures = batch.run()
     except KeyboardInterrupt:
-        batch.keep_finished()
-        kept = sum(key in store for key in problems)
+        with interrupts_ignored():
+            batch.keep_finished()
+            kept = sum(key in store for key in problems)
         raise KeyboardInterrupt(
             f"{kept} of {len(problems)} simulations are kept: give the same command again to go on from there"
         ) from None

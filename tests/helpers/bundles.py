@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,16 @@ def make_bundle(folder: Path, seed: int = 0) -> Path:
     field = _noisy_field(problem, solution, np.random.default_rng(seed))
     write_bundle(folder, experiment, Contents(curve=_record(solution.curve), fields=field, labels=labels))
     return folder
+
+
+def edit(folder: Path, **values: str) -> None:
+    """Set keys of experiment.toml, wherever they stand, to values as they are written there."""
+    path = folder / "experiment.toml"
+    text = path.read_text("utf-8")
+    for key, value in values.items():
+        text, count = re.subn(rf"^(?:# )?{key} *=.*$", lambda _, k=key, v=value: f"{k} = {v}", text, flags=re.M)
+        assert count, f"{key} is not in {path}"
+    path.write_text(text, "utf-8")
 
 
 def _noisy_field(problem: Problem, solution: Solution, random: np.random.Generator) -> DisplacementField:
