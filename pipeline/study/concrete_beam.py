@@ -13,9 +13,15 @@ import numpy as np
 
 from pipeline.core.curve import LoadCurve
 from pipeline.core.units import MINUTE, MM
+from pipeline.lmp.simulate import solve
+from pipeline.store.bundle import read_bundle
 from pipeline.store.experiment import Experiment
 from pipeline.store.new import Contents, write_bundle
 from pipeline.store.records import Record, read_record
+from pipeline.store.results import read_result
+from pipeline.store.start import start_parameters
+from pipeline.study.assembly import build_model
+from pipeline.study.identify import identify
 
 RECORD = Path("concrete_cmod_pypd") / "half_notched_beam.csv"
 RATE = 0.05 * MM / MINUTE  # not recorded; nothing here depends on time
@@ -74,3 +80,45 @@ def envelope_share(record: LoadCurve, cmod: np.ndarray, load: np.ndarray) -> tup
     middle, half = (np.interp(at, record.cmod, y) for y in (record.load, 2 * record.load_std))
     excess = np.abs(simulated - middle) - half
     return float(np.mean(excess <= 0)), float(max(excess.max(), 0.0))
+
+
+def beam_table(data: Path, folder: Path, radii_mm: tuple[float, ...] = (0.6, 0.3)) -> str:
+    """The beam simulated with its published properties, at two radii and two lattice angles, as a Markdown table."""
+    rows = [
+        "| angle | radius | peak load | CMOD at peak | inside the envelope | largest excess |",
+        "|---|---|---|---|---|---|",
+    ]
+    for angle in (90.0, 0.0):
+        place = folder / f"beam-{angle:.0f}"
+        record = read_record(data / RECORD, cmod_rate=RATE)
+        if not (place / "experiment.toml").is_file():
+            concrete_beam(data, place, angle)
+        bundle = read_bundle(place)
+        for radius in radii_mm:
+            f_max, delta_max = start_parameters(bundle)
+            curve = solve(build_model(bundle, radius * MM).problem(f_max, delta_max)).curve
+            cmod, load = curve.peak()
+            share, excess = envelope_share(record.curve, curve.cmod, curve.load)
+            rows.append(
+                f"| {angle:.0f}° | {radius} mm | {load:.0f} N | {cmod / MM:.4f} mm | {share:.0%} | {excess:.0f} N |"
+            )
+    return "\n".join(rows) + "\n"
+
+
+def beam_identification(data: Path, folder: Path, radius_mm: float = 0.6) -> str:
+    """The beam identified from load–CMOD alone, in sentences."""
+    place, out = folder / "beam-90", folder / "identified"
+    record = read_record(data / RECORD, cmod_rate=RATE)
+    if not (place / "experiment.toml").is_file():
+        concrete_beam(data, place)
+    told = identify(place, out, objective="load", radius_mm=radius_mm)
+    found = read_result(out)
+    cmod, load = (np.array(found["load_cmod"][k], float) for k in ("cmod_mm", "load_n"))
+    share, excess = envelope_share(record.curve, cmod * MM, load)
+    area = 2 * 0.3 * MM * 50 * MM
+    strength = np.sqrt(3) * found["f_max_n"] / area / 1e6
+    energy = found["bond_fracture_energy_j_per_m2"]
+    return (
+        f"{told}\nf_t = {strength:.2f} MPa, G_f = {energy:.0f} J/m²; peak {found['peak_load_n']:.0f} N; "
+        f"{share:.0%} of the curve inside the envelope, largest excess {excess:.0f} N"
+    )
