@@ -39,7 +39,7 @@ class RunSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     engine: Literal["lammps", "equilibrium", "reference"] = Field(default="lammps", description="what solves the tests")
-    accuracy: Annotated[float, Field(gt=0, le=0.2)] = Field(
+    accuracy: Annotated[float, Field(ge=1e-5, le=0.2)] = Field(
         default=0.01, description="quasi-static error asked for, relative, in load and displacement"
     )
     workers: Annotated[int, Field(ge=1, le=4096)] | None = Field(
@@ -90,7 +90,10 @@ def run_settings(options: Mapping[str, Any], file: str = "options") -> RunSettin
     try:
         return RunSettings.model_validate({key: value for key, value in options.items() if value is not None})
     except ValidationError as error:
-        raise InputError("\n".join(f"{file}: {_sentence(problem)}" for problem in error.errors())) from None
+        problems = error.errors()
+        entries = {problem["loc"][0] for problem in problems if len(problem["loc"]) > 1}
+        told = (p for p in problems if p["type"] != "too_short" or p["loc"][0] not in entries)  # a faulty one counts
+        raise InputError("\n".join(f"{file}: {_sentence(problem)}" for problem in told)) from None
 
 
 def load_settings(path: Path, options: Mapping[str, Any] | None = None) -> RunSettings:
@@ -111,12 +114,17 @@ def load_settings(path: Path, options: Mapping[str, Any] | None = None) -> RunSe
     return run_settings(raw | given, path.name)
 
 
+_LENGTHS = {"too_short": "needs at least {min_length} entries", "too_long": "has more than {max_length} entries"}
+
+
 def _sentence(problem: ErrorDetails) -> str:
     """One problem in words: key, value, rule."""
     key, kind = str(problem["loc"][0]), problem["type"]
     if kind == "extra_forbidden":
         meant = difflib.get_close_matches(key, list(RunSettings.model_fields), n=1)
         return f"{key} is not a setting: " + (f"did you mean {meant[0]}?" if meant else "remove it")
+    if kind in _LENGTHS:
+        return f"{key} = {problem['input']!r}: {_LENGTHS[kind].format(**problem['ctx'])}"
     rule = str(problem["ctx"]["error"]) if kind == "value_error" else problem["msg"].replace("Input should", "should")
     return f"{key} = {problem['input']!r}: {rule}"
 

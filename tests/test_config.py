@@ -41,7 +41,7 @@ def test_options_that_are_none_are_defaults_and_others_win_over_the_file(tmp_pat
     ("options", "sentence"),
     [
         ({"acuracy": 0.01}, "acuracy is not a setting: did you mean accuracy?"),
-        ({"accuracy": 0}, "accuracy = 0: should be greater than 0"),
+        ({"accuracy": 0}, "accuracy = 0: should be greater than or equal to 0.00001"),
         ({"accuracy": float("nan")}, "accuracy = nan: "),
         ({"engine": "abaqus"}, "engine = 'abaqus': should be 'lammps', 'equilibrium' or 'reference'"),
         ({"workers": 0}, "workers = 0: should be greater than or equal to 1"),

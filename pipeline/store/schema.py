@@ -121,6 +121,8 @@ def opened(path: Path) -> h5py.File:
         raise MissingFileError(f"{path} {reason}: check its name, or make it again")
     try:
         return h5py.File(path, "r", locking=False)
+    except PermissionError as error:
+        raise StoreError(f"{path.name}: there is no permission to read it: change its rights") from error
     except (OSError, RuntimeError) as error:
         raise _damaged(path, error) from error
 

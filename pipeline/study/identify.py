@@ -24,7 +24,7 @@ from pipeline.inverse.observations import Measured, Simulated
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.layouts import IDENTIFY
 from pipeline.store.problem_key import problem_key
-from pipeline.store.results import write_arrays, write_result
+from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
@@ -129,7 +129,7 @@ def identify(
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
     refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
-    store = SimulationStore(folder / "simulations")
+    store = SimulationStore(prepare_output(folder / "simulations"))
     campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent(), set())
     found = search(campaign, aim)
     problem, optimum = run_optimum(campaign, found)

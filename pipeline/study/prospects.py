@@ -27,12 +27,19 @@ def refuse_hopeless(model: Model, measured: Measured, aim: Objective, rigid: Rig
     ------
     InputError
         where the record ends at its peak, the simulated test ends before the first station, no bond takes
-        part in the search, or measurement and simulated test have too little in common
+        part in the search, a displacement is impossible, or measurement and simulated test have too little
+        in common
     """
     _refuse_peakless(model.bundle.need_curve())
     _refuse_early_end(float(measured.cmod[0]), model.bundle.cmod_max)
     _refuse_fixed(model)
-    compare(measured, _everything_until(model.bundle.cmod_max, measured), aim, rigid)
+    _refuse_wild(model, measured)
+    best = compare(measured, _everything_until(model.bundle.cmod_max, measured), aim, rigid)
+    if aim is Objective.BOTH and best.field_scale == 0:
+        raise InputError(
+            "fields.h5: std_mm is zero, so that displacements cannot be weighed against loads: write their standard "
+            "deviation, or choose --objective fields or load"
+        )
 
 
 def shows_peak(curve: LoadCurve) -> bool:
@@ -64,6 +71,22 @@ def _refuse_fixed(model: Model) -> None:
         raise InputError(
             "the specimen holds no bond of mastic or interface that could break, so that nothing tells f_max and "
             "delta_max of the mastic: check the specimen's image, or set [material] aggregate_follows = true"
+        )
+
+
+def _refuse_wild(model: Model, measured: Measured) -> None:
+    """Refuse displacements larger than the specimen."""
+    field = measured.field
+    if field is None:
+        return
+    x0, y0, x1, y1 = model.bundle.specimen.bounds
+    moved = np.where(field.valid, np.abs(field.displacement).max(axis=-1), 0.0)
+    station, point = np.unravel_index(np.argmax(moved), moved.shape)
+    if moved[station, point] > max(x1 - x0, y1 - y0):
+        x, y = field.points[point] / MM
+        raise InputError(
+            f"fields.h5: the point at ({x:.4g}, {y:.4g}) mm moves by {moved[station, point] / MM:.3g} mm at a CMOD of "
+            f"{measured.cmod[station] / MM:.3g} mm, farther than the specimen is large: mark it as not valid"
         )
 
 

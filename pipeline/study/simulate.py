@@ -16,7 +16,7 @@ from pipeline.execution.simulations import run_all
 from pipeline.store.bundle import read_bundle
 from pipeline.store.layouts import SIMULATE
 from pipeline.store.problem_key import problem_key
-from pipeline.store.results import write_arrays, write_result
+from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.study.assembly import build_model, settings_of
 from pipeline.study.engines import engine as engine_of
@@ -52,7 +52,7 @@ def simulate(
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
     problem = model.problem(f_max, delta_max, accuracy=settings.accuracy)
-    store = SimulationStore(folder / "simulations")
+    store = SimulationStore(prepare_output(folder / "simulations"))
     key = problem_key(problem, chosen.label)
     progress = progress or Silent()
     progress.stage("simulating")
