@@ -5,9 +5,7 @@ import subprocess
 import sys
 import time
 
-START = (
-    "from pipeline.dic.speckle import smooth_pair as p; from pipeline.dic.correlate import correlate as c; x = p(100)"
-)
+START = "from pipeline.dic.speckle import smooth_pair as p; from pipeline.dic.correlate import correlate as c; x=p(100)"
 
 
 def first_result() -> float:
