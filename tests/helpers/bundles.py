@@ -19,7 +19,7 @@ from pipeline.store.sections import PixelFrame
 from pipeline.study.assembly import build_model
 from pipeline.study.observation import observe_solution
 
-RADIUS_MM = 1.5
+RADIUS_MM = 2.0
 F_MAX, DELTA_MAX = 73.0 * RADIUS_MM / 0.3, 1.18e-4  # N, m; the truth, off the lines of the grid
 NOISE = 4e-7  # m, of one displacement component
 CMOD_MAX_MM = 0.3
