@@ -15,7 +15,7 @@ class LinearSoftening:
 
     Elastic with K^n up to f_max at δ_peak = f_max/K^n, then a straight line to zero at δ_max, counted
     from the unstretched bond; unloading goes straight to the origin; compression is elastic with K^n,
-    whatever has happened before (Hill et al. 2017, eq. 6 and fig. 5). The only history is δ_reached, the
+    whatever has happened before (Hill et al. 2017, Fig. 6). The only history is δ_reached, the
     largest opening seen, zero at the start. `reached` in the methods below is the one *before* the
     opening at hand: the law takes the larger of the two.
 

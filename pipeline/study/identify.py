@@ -211,7 +211,8 @@ def identification_result(
         "interval_95_bond_fracture_energy_j_per_m2": doubt and [2 * e / area for e in doubt.bond_energy],
         "interval_contains": doubt and doubt.contains,
         "interval_lacks": doubt and doubt.lacks,
-        "interval_noise_only": doubt and doubt.noise_only,
+        "interval_noise_only": doubt
+        and {"f_max_n": doubt.noise_only["f_max"], "delta_max_m": doubt.noise_only["delta_max"]},
         "correlation": doubt and doubt.correlation,
         "objective": found.settings.objective,
         "objective_min": found.minimum.value,
