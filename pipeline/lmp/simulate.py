@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.core.curve import LoadCurve
-from pipeline.core.errors import ConvergenceError, PipelineError, StoreError
+from pipeline.core.errors import ConvergenceError, PipelineError, StoreError, ToolchainError
 from pipeline.core.problem import EnergyBalance, Problem, Solution
 from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.output import read_curve, read_frames, read_reached
@@ -45,6 +45,8 @@ def solve(problem: Problem, folder: Path | None = None) -> Solution:
             return _solve_in(problem, Path(temporary))
     except StoreError:
         raise
+    except FileNotFoundError as error:
+        raise ToolchainError(f"{error.filename} does not exist: install the package again") from error
     except OSError as error:
         place = folder or tempfile.gettempdir()
         raise StoreError(f"the files of a simulation cannot be written in {place}: {error.strerror}{ROOM}") from error
