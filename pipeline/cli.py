@@ -216,26 +216,26 @@ def virtual_test(
     with exit_codes(debug):
         with Display() as progress:
             refuse_until_built(creep=creep, effect=effect, images=images)
-            from pipeline.study.output import refuse_measured_bundle
+            from pipeline.study.output import virtual_test_folder
             from pipeline.study.virtual_test import virtual_test as make
 
-            refuse_measured_bundle(out)
-            summary = make(
-                out,
-                geometry=geometry,
-                specimen=specimen,
-                like=like,
-                f_max=f_max,
-                delta_max=delta_max,
-                start=start,
-                radius_mm=radius_mm,
-                mm_per_px=mm_per_px,
-                noise_px=noise_px,
-                load_noise_n=load_noise_n,
-                config=config,
-                seed=seed,
-                progress=progress,
-            )
+            with virtual_test_folder(out):
+                summary = make(
+                    out,
+                    geometry=geometry,
+                    specimen=specimen,
+                    like=like,
+                    f_max=f_max,
+                    delta_max=delta_max,
+                    start=start,
+                    radius_mm=radius_mm,
+                    mm_per_px=mm_per_px,
+                    noise_px=noise_px,
+                    load_noise_n=load_noise_n,
+                    config=config,
+                    seed=seed,
+                    progress=progress,
+                )
         finish(summary, out)
 
 

@@ -53,6 +53,26 @@ def bond_opening(text: str) -> float:
     return _within(text, 1e-8, 1e-2, "m")
 
 
+def particle_radius(text: str) -> float:
+    """A radius in mm, in the range of [model] particle_radius_mm."""
+    return _within(text, 1e-3, 20, "mm")
+
+
+def pixel_pitch(text: str) -> float:
+    """A scale in mm, in the range of mm_per_px."""
+    return _within(text, 1e-5, 10, "mm")
+
+
+def pixel_noise(text: str) -> float:
+    """A standard deviation in px: none, or one that a bundle can state."""
+    return 0.0 if not_negative(text) == 0 else _within(text, 1e-5, 20, "px")
+
+
+def load_noise(text: str) -> float:
+    """A standard deviation in N: none, or in the range of [noise] load_std_n."""
+    return 0.0 if not_negative(text) == 0 else _within(text, 1e-6, 1e7, "N")
+
+
 def _within(text: str, low: float, high: float, unit: str) -> float:
     value = positive(text)
     if not low <= value <= high:
@@ -100,7 +120,12 @@ Bundle = Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of the ex
 Out = Annotated[Path, option("-o", "--out", metavar="OUT", help="Folder for the results; a stopped run goes on in it.")]
 Radius = Annotated[
     float | None,
-    option("--radius-mm", metavar="R", parser=positive, help="Particle radius instead of the bundle's; f_max follows."),
+    option(
+        "--radius-mm",
+        metavar="R",
+        parser=particle_radius,
+        help="Particle radius instead of the bundle's; f_max follows.",
+    ),
 ]
 # what is left out here has the value of --config, or else the default of the settings
 EngineChoice = Annotated[Engine | None, option("--engine", help="What simulates (default: lammps).")]
@@ -135,7 +160,7 @@ Start = Annotated[
     Any,
     option("--start", metavar="F,D", parser=start_point, help="Start in the bundle: f_max in N, delta_max in m."),
 ]
-Scale = Annotated[float | None, option("--mm-per-px", metavar="S", parser=positive, help="Scale of the images.")]
+Scale = Annotated[float | None, option("--mm-per-px", metavar="S", parser=pixel_pitch, help="Scale of the images.")]
 ObjectiveChoice = Annotated[
     Objective | None, option("--objective", help="What is compared; fields where there are any, else load.")
 ]
@@ -146,6 +171,6 @@ CmodRate = Annotated[
     float | None,
     option("--cmod-rate-mm-per-min", metavar="V", parser=positive, help="Gives a record without times its times."),
 ]
-NoisePx = Annotated[float, option("--noise-px", metavar="S", parser=not_negative, help="Noise of displacements (px).")]
-LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=not_negative, help="Noise of the load (N).")]
+NoisePx = Annotated[float, option("--noise-px", metavar="S", parser=pixel_noise, help="Noise of displacements (px).")]
+LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=load_noise, help="Noise of the load (N).")]
 Version = Annotated[bool, option("--version", is_eager=True, callback=show_version, help="Show the version and exit.")]

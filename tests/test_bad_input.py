@@ -366,7 +366,7 @@ def test_results_are_kept_out_of_the_bundle_itself(bundle, command, place):
 
 
 def test_a_virtual_test_is_not_made_over_a_measured_one(bundle):
-    told = "holds a bundle, and no truth.json of a finished virtual test"
+    told = "holds a bundle that is no virtual test (no truth.json)"
     assert_refused(bundle.parent, ("virtual-test", bundle, "--radius-mm", "2"), told)
     assert_refused(bundle.parent, ("new", bundle, "--geometry", "seb"), "is not empty")
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pipeline.core.errors import InputError, MissingFileError, StoreError
 from pipeline.store import frames
+from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle
 from pipeline.store.experiment import FILE
 from pipeline.store.results import prepare_output, read_result
 
-TRUTH = "truth.json"  # marks the bundle of a virtual test
+TRUTH, UNFINISHED = "truth.json", "unfinished-virtual-test.txt"  # mark the bundle of a virtual test
 
 
 def results_folder(out: Path, bundle: Bundle) -> Path:
@@ -39,12 +42,31 @@ def results_folder(out: Path, bundle: Bundle) -> Path:
     return prepare_output(out)
 
 
-def refuse_measured_bundle(out: Path) -> None:
-    """Refuse to make a virtual test where a bundle lies that no virtual test left there."""
-    if (out / FILE).exists() and not (out / TRUTH).exists():
-        raise InputError(
-            f"{out} holds a bundle, and no {TRUTH} of a finished virtual test: choose another folder, or delete it"
-        )
+@contextmanager
+def virtual_test_folder(out: Path) -> Iterator[None]:
+    """Let a virtual test be made in OUT; one that was stopped may be made again there, a measured one stays.
+
+    Raises
+    ------
+    InputError
+        where a bundle lies that no virtual test left there
+    StoreError
+        where OUT cannot be written
+    """
+    out, mark = Path(out), Path(out) / UNFINISHED
+    if (out / FILE).exists() and not (out / TRUTH).exists() and not mark.exists():
+        raise InputError(f"{out} holds a bundle that is no virtual test (no {TRUTH}): choose another folder")
+    prepare_output(out)
+    write_atomically(mark, b"a virtual test that was not finished: the same command makes it again\n")
+    done = False
+    try:
+        yield
+        done = True
+    finally:
+        if done or not (out / FILE).exists():  # finished, or refused before anything was written
+            mark.unlink(missing_ok=True)
+            with suppress(OSError):  # it holds something
+                out.rmdir()
 
 
 def _owner(out: Path) -> str | None:
