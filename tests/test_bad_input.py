@@ -371,6 +371,23 @@ def test_a_virtual_test_is_not_made_over_a_measured_one(bundle):
     assert_refused(bundle.parent, ("new", bundle, "--geometry", "seb"), "is not empty")
 
 
+def test_a_virtual_test_that_was_stopped_is_made_again_in_its_place(tmp_path):
+    out = tmp_path / "virtual"
+    line = ("virtual-test", out, "--radius-mm", "2")
+    assert_refused(tmp_path, (*line, "--delta-max", "1e-8"), "must be larger than delta_peak")
+    assert_refused(tmp_path, (*line, "--specimen", tmp_path / "no.png", "--mm-per-px", "1"), "no.png: does not exist")
+    made = run(*line)
+    assert made.exit_code == 0, made.stderr
+    assert sorted(path.name for path in out.iterdir()) == [
+        "experiment.toml",
+        "fields.h5",
+        "labels.png",
+        "load_cmod.csv",
+        "truth.json",
+    ]
+    assert run("check", out).exit_code == 0
+
+
 def test_two_bundles_do_not_share_their_results(bundle, simulated, tmp_path):
     out = shutil.copytree(simulated, tmp_path / "out")
     edit(bundle, name='"another"')
