@@ -20,20 +20,7 @@ def start(folder: Path) -> subprocess.Popen[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     line = [sys.executable, "-m", "execution.fake_engine", str(folder), str(COUNT), "0.5"]
     pipe = subprocess.PIPE
-    return subprocess.Popen(
-        line,
-        env=environment,
-        start_new_session=True,
-        stdout=pipe,
-        stderr=pipe,
-        text=True,
-        preexec_fn=hear_interrupts,
-    )
-
-
-def hear_interrupts() -> None:
-    """As a terminal's shell does: what starts the tests in its background lets them ignore interrupts."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    return subprocess.Popen(line, env=environment, start_new_session=True, stdout=pipe, stderr=pipe, text=True)
 
 
 def wait_for_the_middle(folder: Path) -> list[int]:
