@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bundles import edit, make_bundle
-from helpers.commands import alive, end_group, start, wait_for, workers
+from helpers.commands import alive, end_group, hears_interrupts, start, wait_for, workers
 from typer.testing import CliRunner, Result
 
 from pipeline.cli import app
@@ -155,8 +155,9 @@ def test_a_bundle_edited_in_between_gets_its_own_simulations_and_keeps_the_old_o
 def test_an_impatient_interrupt_before_anything_is_finished_is_one_message(bundle, tmp_path, runs):
     out, scratch = tmp_path / "out", tmp_path / "scratch"
     runs.append(stopped := start("identify", bundle, "-o", out, *GRID, scratch=scratch))
-    wait_for(lambda: workers(stopped.pid))
+    wait_for(lambda: len(workers(stopped.pid)) == 2)
     spawned = workers(stopped.pid)
+    assert not any(hears_interrupts(pid) for pid in spawned)  # from their start: else they would tell of it
     for _ in range(3):
         os.killpg(stopped.pid, signal.SIGINT)
         time.sleep(0.05)

@@ -46,6 +46,13 @@ def alive(pid: int) -> bool:
     return bool(state) and state[0] != "Z"
 
 
+def hears_interrupts(pid: int) -> bool:
+    """Whether an interrupt would reach a process."""
+    lines = (line.partition(":") for line in _text(Path(f"/proc/{pid}/status")).splitlines())
+    masks = [int(value, 16) for name, _, value in lines if name in ("SigBlk", "SigIgn")]
+    return not any(mask & 1 << signal.SIGINT - 1 for mask in masks)
+
+
 def end_group(process: subprocess.Popen[str]) -> None:
     """End a started command and all it spawned, should a test have left it running."""
     if process.poll() is None:
