@@ -38,7 +38,7 @@ def experiments(draw) -> Experiment:
     specimen = {"geometry": geometry, **sizes[geometry]} | ({"image": frame} if draw(st.booleans()) else {})
     raw = {
         "format": 1,
-        "name": draw(st.from_regex(r"[A-Za-z0-9._-]{1,20}", fullmatch=True)),
+        "name": draw(st.from_regex(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,19}", fullmatch=True)),
         "specimen": specimen,
         "loading": {"cmod_rate_mm_per_min": draw(st.floats(1e-3, 100))},
         "material": {"poissons_ratio": draw(st.floats(0, 0.49)), "plane": draw(st.sampled_from(["strain", "stress"]))},
