@@ -19,7 +19,7 @@ import typer
 
 from pipeline.cli import app
 from pipeline.equilibrium.path import Increments
-from pipeline.lmp import loading
+from pipeline.explicit import loading
 from pipeline.store.fields import read_fields
 from pipeline.study import identify, model, observation, simulate, virtual_test
 

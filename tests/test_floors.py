@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 FLOORS = {
     1: {"core"},
-    2: {"materials", "microstructure", "dic", "inverse"},
+    2: {"materials", "microstructure", "dic", "inverse", "explicit"},
     3: {"gap"},
     4: {"lmp", "reference", "equilibrium", "twin", "blind"},
     5: {"store", "config", "report", "execution", "hpc"},

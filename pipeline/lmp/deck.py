@@ -8,10 +8,10 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from pipeline.core.problem import Grip, Problem
+from pipeline.explicit.loading import Loading, loading_rule
+from pipeline.explicit.modes import Modes, lowest_modes
 from pipeline.lmp.data_file import write_data_file
 from pipeline.lmp.law_table import LawTable, law_table
-from pipeline.lmp.loading import Loading, loading_rule
-from pipeline.lmp.modes import Modes, lowest_modes
 
 DECK = "fracture.lmp"
 

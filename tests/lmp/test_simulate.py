@@ -16,9 +16,9 @@ from helpers.beams import small_beam
 
 from pipeline.core.errors import ConvergenceError, PipelineError
 from pipeline.core.problem import Kinematics, Problem
+from pipeline.explicit.modes import lowest_modes, masses
 from pipeline.lmp import plugin
 from pipeline.lmp.deck import DECK, write_deck
-from pipeline.lmp.modes import lowest_modes, masses
 from pipeline.lmp.output import read_curve
 from pipeline.lmp.simulate import read_solution, run, solve
 
@@ -170,7 +170,7 @@ def test_masses_keep_every_mode_below_the_stability_limit(beam: Problem) -> None
     from scipy import sparse
     from scipy.sparse.linalg import eigsh
 
-    from pipeline.lmp.modes import SAFETY, stiffness_matrix
+    from pipeline.explicit.modes import SAFETY, stiffness_matrix
 
     mass = sparse.diags(np.repeat(masses(beam), 2)).tocsc()
     highest = eigsh(stiffness_matrix(beam), k=1, M=mass, return_eigenvectors=False)[0]
@@ -181,7 +181,7 @@ def test_masses_keep_every_mode_below_the_stability_limit(beam: Problem) -> None
 def test_lowest_mode_is_that_of_a_dense_solver() -> None:
     from scipy.linalg import eigh, null_space
 
-    from pipeline.lmp.modes import stiffness_matrix
+    from pipeline.explicit.modes import stiffness_matrix
 
     beam = small_beam(2e-3, stones=False)
     rows = np.zeros((len(beam.grips), beam.particles.count, 2))

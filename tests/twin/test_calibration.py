@@ -7,7 +7,7 @@ import pytest
 from helpers.beams import PAPER, small_beam
 
 from pipeline.core.units import GPA, MM
-from pipeline.lmp.modes import lowest_modes
+from pipeline.explicit.modes import lowest_modes
 from pipeline.materials.elastic import Plane
 from pipeline.materials.mixture import Mixture
 from pipeline.twin.calibration import PATH, calibrated_factors, check_factors

@@ -1,4 +1,4 @@
-"""The undamaged specimen as LAMMPS sees it: masses, elastic response, lowest mode."""
+"""The undamaged specimen as explicit engines see it: masses, elastic response, lowest mode."""
 
 from __future__ import annotations
 

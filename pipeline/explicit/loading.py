@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.problem import Problem
-from pipeline.lmp.modes import Modes
+from pipeline.explicit.modes import Modes
 
 PERIODS = 40
 LAG = 0.5
