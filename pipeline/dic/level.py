@@ -96,6 +96,33 @@ class MovedMesh:
         self._in_pieces(origin, seen, place)
         return origin, seen
 
+    def displacement_at(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How material points move, exactly as they are photographed.
+
+        Parameters
+        ----------
+        points : (n, 2) array, px; undeformed
+
+        Returns
+        -------
+        displacement : (n, 2) array, px; NaN where there is no material
+        material : (n,) bool
+        """
+        mesh = self.mesh
+        triangle = mesh.delaunay.find_simplex(points)
+        material = (triangle >= 0) & mesh.material[triangle]
+        corner = mesh.delaunay.simplices[triangle]
+        before = mesh.points[corner]
+        sides = np.stack([before[:, 1] - before[:, 0], before[:, 2] - before[:, 0]], axis=2)
+        share = np.linalg.solve(sides, (points - before[:, 0])[:, :, None])[:, :, 0]
+        moved = self.displacement[corner]
+        smooth = moved[:, 0] + np.einsum("nk,nkd->nd", share, moved[:, 1:] - moved[:, :1])
+        own = np.argmin(np.linalg.norm(before - points[:, None], axis=2), axis=1)
+        node = corner[np.arange(len(points)), own]
+        torn = self.displacement[node] + np.einsum("nij,nj->ni", self._gradient[node], points - mesh.points[node])
+        found = np.where(self.whole[triangle][:, None], smooth, torn)
+        return np.where(material[:, None], found, np.nan), material
+
     def _in_triangle(self, corner: np.ndarray, place: np.ndarray) -> np.ndarray:
         """The point of the undeformed triangle with the same shares of the corners."""
         now = (self.mesh.points + self.displacement)[corner]
@@ -111,7 +138,7 @@ class MovedMesh:
         left = np.flatnonzero(~seen)
         if not corners.size or not left.size:
             return
-        gradient = self._gradient()
+        gradient = self._gradient
         count = min(3, corners.size)
         near = cKDTree((self.mesh.points + self.displacement)[corners]).query(place[left], k=count)[1]
         for node in corners[near.reshape(-1, count)].T:
@@ -123,6 +150,7 @@ class MovedMesh:
             mine = (triangle >= 0) & torn[triangle] & (corner[np.arange(len(own)), own] == node) & ~seen[left]
             origin[left[mine]], seen[left[mine]] = start[mine], True
 
+    @cached_property
     def _gradient(self) -> np.ndarray:
         """(k, 2, 2) displacement gradient at the points, the mean over the whole triangles around."""
         corner = self.mesh.delaunay.simplices[self.whole]

@@ -44,6 +44,98 @@ class _Base:
         return Match(core(), self.picture, current, grid, settings, lost, far, line)
 
 
+class Tracker:
+    """A series that is followed frame by frame, and can be taken up again after any frame.
+
+    Parameters
+    ----------
+    first : (rows, columns) array; the unloaded picture, frame 0
+    settings : Settings; `search_px` is against the frame before
+    renew_znssd : median ZNSSD of the sound points above which the frame before becomes the reference
+
+    Attributes
+    ----------
+    number : int; the last frame that was followed
+    base : int; the frame that is the reference
+    sound : float; largest share of sound points since the reference was renewed
+    """
+
+    def __init__(self, first: np.ndarray, settings: Settings | None = None, *, renew_znssd: float = 0.25) -> None:
+        self.settings = settings or Settings()
+        self.renew_znssd = renew_znssd
+        self.number = self.base = 0
+        self.sound = 0.0
+        self._first = checked(first, "frame 0")
+        self._shape = self._first.shape
+        self.grid = Grid.over((self._shape[0], self._shape[1]), self.settings)
+        self._base = _Base(self._first, core().Picture(self._first), None)
+        self._before: tuple[np.ndarray, Any, Correlation] | None = None
+        self._earlier: Correlation | None = None
+
+    def resume(
+        self,
+        number: int,
+        last: tuple[np.ndarray, Correlation],
+        earlier: Correlation | None,
+        base: tuple[int, np.ndarray, Correlation] | None,
+        sound: float,
+    ) -> None:
+        """Go on after frame `number` as if it had just been followed.
+
+        Parameters
+        ----------
+        number : int
+        last : picture and result of that frame
+        earlier : result of the frame before it, None where that is frame 0
+        base : number, picture and result of the reference, None for frame 0
+        sound : float; `sound` after that frame
+        """
+        self.number, self.sound, self._earlier = number, sound, earlier
+        grey = checked(last[0], f"frame {number}", like=self._first)
+        picture = core().Picture(grey)
+        self._before = (grey, picture, last[1])
+        if base is not None:
+            self.base = base[0]
+            image = grey if base[0] == number else checked(base[1], f"frame {base[0]}", like=self._first)
+            self._base = _Base(image, core().Picture(image), base[2])
+
+    def follow(self, frame: np.ndarray) -> Correlation:
+        """The next frame against frame 0.
+
+        Raises
+        ------
+        InputError
+            for a picture that cannot be used, naming the frame
+        ConvergenceError
+            where nothing is found again
+        """
+        number = self.number + 1
+        grey = checked(frame, f"frame {number}", like=self._first)
+        picture = core().Picture(grey)
+        start = _ahead(self._before[2], self._earlier) if self._before else None
+        result, renewed = self._found(picture, grey, start, number)
+        if result is None:
+            raise ConvergenceError(f"frame {number}: the speckle of the frame before is not found again")
+        self.sound = max(0.0 if renewed else self.sound, _share(result, self._shape))
+        self._earlier = self._before[2] if self._before else None
+        self._before, self.number = (grey, picture, result), number
+        return result
+
+    def _found(
+        self, picture: Any, grey: np.ndarray, start: Correlation | None, number: int
+    ) -> tuple[Correlation | None, bool]:
+        """The match with the reference, or with the frame before where that has decayed; whether it was renewed."""
+        result = _against(self._base, picture, grey, self.grid, self.settings, start, number)
+        if self._before is None or self.base == self.number:
+            return result, False
+        if not _decayed(result, self._shape, self.sound, self.renew_znssd):
+            return result, False
+        self._base, self.base = _Base(*self._before), self.number
+        again = _against(self._base, picture, grey, self.grid, self.settings, start, number)
+        keep = result is not None and again is not None and again.valid.sum() < result.valid.sum()
+        return (result if keep else again if again is not None else result), True
+
+
 def track(
     frames: Iterable[np.ndarray], settings: Settings | None = None, *, renew_znssd: float = 0.25
 ) -> Iterator[Correlation]:
@@ -52,8 +144,7 @@ def track(
     Parameters
     ----------
     frames : pictures of one size, the first unloaded; read one at a time, two are kept
-    settings : Settings; `search_px` is against the frame before
-    renew_znssd : median ZNSSD of the sound points above which the frame before becomes the reference
+    settings, renew_znssd : as of `Tracker`
 
     Yields
     ------
@@ -67,30 +158,10 @@ def track(
     ConvergenceError
         where nothing is found again
     """
-    settings = settings or Settings()
     series = iter(frames)
-    first = checked(next(series), "frame 0")
-    grid = Grid.over(first.shape, settings)
-    base = _Base(first, core().Picture(first), None)
-    before: tuple[np.ndarray, Any, Correlation] | None = None
-    earlier: Correlation | None = None
-    sound = 0.0
-    for number, frame in enumerate(series, start=1):
-        grey = checked(frame, f"frame {number}", like=first)
-        picture = core().Picture(grey)
-        start = _ahead(before[2], earlier) if before else None
-        result = _against(base, picture, grey, grid, settings, start, number)
-        if before and before[2] is not base.carried and _decayed(result, grey.shape, sound, renew_znssd):
-            base = _Base(*before)
-            again = _against(base, picture, grey, grid, settings, start, number)
-            result = again if result is None or again is None or again.valid.sum() >= result.valid.sum() else result
-            sound = 0.0
-        if result is None:
-            raise ConvergenceError(f"frame {number}: the speckle of the frame before is not found again")
-        sound = max(sound, _share(result, grey.shape))
-        earlier = before[2] if before else None
-        before = (grey, picture, result)
-        yield result
+    tracker = Tracker(next(series), settings, renew_znssd=renew_znssd)
+    for frame in series:
+        yield tracker.follow(frame)
 
 
 def _ahead(last: Correlation, earlier: Correlation | None) -> Correlation:

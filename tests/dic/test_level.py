@@ -84,3 +84,16 @@ def test_the_mesh_shows_each_material_point_once_and_nothing_in_the_gap():
 def test_too_few_points_are_refused():
     with pytest.raises(InputError, match="at least 3"):
         Mesh(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize("by", [0.0, 0.2e-3, 0.5e-3])
+def test_what_is_photographed_is_what_is_told(by):
+    mesh = Mesh(VIEW.pixel(POINTS))
+    moved = mesh.moved(VIEW.pixel_vector(opened(POINTS, by)), torn(POINTS) if by else None)
+    axis = np.arange(20.0, 160.0)
+    origin, seen = moved.origin_on(axis, axis)
+    place = np.column_stack([np.tile(axis, axis.size), np.repeat(axis, axis.size)])[seen]
+    told, material = moved.displacement_at(origin[seen])
+    assert material.all()
+    np.testing.assert_allclose(origin[seen] + told, place, atol=1e-8)  # the same linear map there and back
+    assert not moved.displacement_at(np.array([[-500.0, 0.0]]))[1].any()

@@ -8,7 +8,7 @@ from pipeline.dic.camera import View
 from pipeline.dic.motion import Affine, Cracked, Cut, truth
 from pipeline.dic.settings import Settings
 from pipeline.dic.speckle import Camera, Speckle, photograph
-from pipeline.dic.track import track, tracked_field
+from pipeline.dic.track import Tracker, track, tracked_field
 
 SHAPE = (220, 220)
 SPECKLE = Speckle.scattered(SHAPE, np.random.default_rng(0))
@@ -99,3 +99,23 @@ def test_pictures_are_taken_one_at_a_time():
     series = track(watched(), Settings(threads=1, search_px=40, grid_step_px=20))
     next(series)
     assert taken == [0, 1]  # frame 2 is not read before it is asked for
+
+
+@pytest.mark.parametrize("stop", [2, 4])
+def test_a_series_taken_up_again_is_the_same(stop):
+    frames = list(pictures(turning(6)))
+    settings = Settings(threads=1, search_px=40, grid_step_px=12)
+    whole, base, sound = Tracker(frames[0], settings, renew_znssd=0.0), [0], [0.0]
+    found = []
+    for frame in frames[1:]:
+        found.append(whole.follow(frame))
+        base.append(whole.base)
+        sound.append(whole.sound)
+    again, number = Tracker(frames[0], settings, renew_znssd=0.0), base[stop]
+    renewed = (number, frames[number], found[number - 1]) if number else None
+    again.resume(stop, (frames[stop], found[stop - 1]), found[stop - 2], renewed, sound[stop])
+    for frame, expected in zip(frames[stop + 1 :], found[stop:], strict=True):
+        result = again.follow(frame)
+        np.testing.assert_array_equal(result.warp, expected.warp)
+        np.testing.assert_array_equal(result.status, expected.status)
+    assert (again.base, again.sound) == (whole.base, whole.sound)
