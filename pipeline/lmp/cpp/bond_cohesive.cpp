@@ -305,7 +305,7 @@ double BondCohesive::single(int type, double /*rsq*/, int i, int j, double &ffor
   const double length = std::hypot(kept[1], kept[2]), distance = std::hypot(dx, dy);
   const double delta = finite ? distance - length : (kept[1] * dx + kept[2] * dy) / length - length;
   const auto &own = law[type];
-  const double tension = (delta < 0.0 ? own.k_n : own.secant(kept[0])) * delta;
+  const double tension = own.tension(delta, kept[0]);
   svector[0] = delta;
   svector[1] = kept[0];
   svector[2] = own.damage(kept[0]);

@@ -31,6 +31,15 @@ struct LinearSoftening {
   // opening beyond which the history grows
   double limit(double reached) const { return damageable() ? std::fmax(reached, delta_peak()) : INFINITY; }
 
+  // largest opening seen, noted only where it matters
+  double grown(double opening, double reached) const { return opening > limit(reached) ? opening : reached; }
+
+  // force at an opening that is not beyond `reached`, or has not left the elastic branch
+  double tension(double opening, double reached) const
+  {
+    return (opening < 0.0 ? k_n : secant(reached)) * opening;
+  }
+
   double damage(double reached) const { return damageable() ? 1.0 - secant(reached) / k_n : 0.0; }
 
   double stored(double opening, double reached) const
