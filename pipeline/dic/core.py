@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import importlib
 from types import ModuleType
 
 from pipeline.core.errors import ToolchainError
+from pipeline.dic import interface
+from pipeline.dic.library import library
 
 
 def core() -> ModuleType:
-    """The compiled module ``pipeline.dic._correlate``.
+    """The module `pipeline.dic.interface`, its library loaded.
 
     Raises
     ------
     ToolchainError
-        if it was not built for this Python
+        if the library was not built, or was built from other sources
     """
     try:
-        return importlib.import_module("pipeline.dic._correlate")
-    except ImportError as error:
+        library()
+    except OSError as error:
         raise ToolchainError(
             f"the compiled core of the image correlation cannot be loaded ({error}): install the package with "
-            "`pip install .`, or build it in place with `cmake -S pipeline/dic/cpp -B build && cmake --build build`"
+            "`pip install .`, or build it in the checkout with `cmake -S . -B build && cmake --build build && "
+            "cmake --install build --prefix .`"
         ) from error
+    return interface

@@ -26,7 +26,11 @@ template <class Task> void parallel_for(int count, int threads, const Task &task
     }
   };
   std::vector<std::thread> pool;
-  for (int worker = 1; worker < workers; ++worker) pool.emplace_back(run, worker);
+  pool.reserve(workers);
+  try {
+    for (int worker = 1; worker < workers; ++worker) pool.emplace_back(run, worker);
+  } catch (const std::exception &) {  // no more threads are to be had: those that run do all of it
+  }
   run(0);
   for (auto &thread : pool) thread.join();
   for (auto &f : failure)

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "parallel.hpp"
@@ -17,6 +18,8 @@ Pattern::Pattern(std::vector<Blob> blobs) : blobs_(std::move(blobs)) {
     for (int k = 0; k < 2; ++k) low[k] = std::min(low[k], at[k] - reach), high[k] = std::max(high[k], at[k] + reach);
   }
   column0_ = low[0], row0_ = low[1];
+  if (!(((high[0] - low[0]) / kCell + 2) * ((high[1] - low[1]) / kCell + 2) < kMostCells))
+    throw std::invalid_argument("the blobs of a pattern lie too far apart, or are too large");
   columns_ = static_cast<int>((high[0] - low[0]) / kCell) + 1;
   rows_ = static_cast<int>((high[1] - low[1]) / kCell) + 1;
   auto each_cell = [&](const Blob &b, auto &&visit) {
@@ -32,7 +35,7 @@ Pattern::Pattern(std::vector<Blob> blobs) : blobs_(std::move(blobs)) {
   for (const Blob &b : blobs_) each_cell(b, [&](int cell) { ++start_[cell + 1]; });
   for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
   member_.resize(start_.back());
-  std::vector<int> fill(start_.begin(), start_.end() - 1);
+  std::vector<std::size_t> fill(start_.begin(), start_.end() - 1);
   for (std::size_t i = 0; i < blobs_.size(); ++i)
     each_cell(blobs_[i], [&](int cell) { member_[fill[cell]++] = static_cast<int>(i); });
 }
@@ -42,7 +45,7 @@ double Pattern::grey_at(double column, double row) const {
   if (!(c >= 0 && r >= 0 && c < columns_ && r < rows_)) return 0;
   const int cell = static_cast<int>(r) * columns_ + static_cast<int>(c);
   double sum = 0;
-  for (int k = start_[cell]; k < start_[cell + 1]; ++k) {
+  for (std::size_t k = start_[cell]; k < start_[cell + 1]; ++k) {
     const Blob &b = blobs_[member_[k]];
     const double dc = column - b.column, dr = row - b.row;
     const double q = (dc * dc + dr * dr) / (b.sigma * b.sigma);
