@@ -15,6 +15,7 @@ from pipeline.core.errors import UnavailableError
 from pipeline.options import (
     Accuracy,
     Bundle,
+    CameraScale,
     CmodRate,
     Config,
     Debug,
@@ -23,9 +24,11 @@ from pipeline.options import (
     EngineChoice,
     Fields,
     FMax,
+    Frames,
     Geometry,
     Grid,
     LoadNoise,
+    NoiseGrey,
     NoisePx,
     ObjectiveChoice,
     Out,
@@ -205,7 +208,10 @@ def virtual_test(
     mm_per_px: Scale = None,
     effect: Effect = None,
     images: Annotated[bool, option("--images", help="Speckle images instead of displacement fields.")] = False,
-    noise_px: NoisePx = 0.01,
+    noise_px: NoisePx = None,
+    noise_grey: NoiseGrey = None,
+    camera_mm_per_px: CameraScale = None,
+    frames: Frames = None,
     load_noise_n: LoadNoise = 5.0,
     config: Config = None,
     workers: Workers = None,
@@ -215,7 +221,7 @@ def virtual_test(
     """Make a bundle with known truth by another kind of model."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(creep=creep, effect=effect, images=images)
+            refuse_until_built(creep=creep, effect=effect)
             from pipeline.study.output import virtual_test_folder
             from pipeline.study.virtual_test import virtual_test as make
 
@@ -230,7 +236,12 @@ def virtual_test(
                     start=start,
                     radius_mm=radius_mm,
                     mm_per_px=mm_per_px,
+                    images=images,
                     noise_px=noise_px,
+                    noise_grey=noise_grey,
+                    camera_mm_per_px=camera_mm_per_px,
+                    frames=frames,
+                    workers=workers,
                     load_noise_n=load_noise_n,
                     config=config,
                     seed=seed,

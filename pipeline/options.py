@@ -68,6 +68,18 @@ def pixel_noise(text: str) -> float:
     return 0.0 if not_negative(text) == 0 else _within(text, 1e-5, 20, "px")
 
 
+def grey_noise(text: str) -> float:
+    """A standard deviation in grey values: none, or one that leaves something to be seen."""
+    return 0.0 if not_negative(text) == 0 else _within(text, 1e-3, 100, "grey values")
+
+
+def subset_size(text: str) -> int:
+    """An odd number of pixels from 5 to 201."""
+    if not text.isdecimal() or int(text) % 2 == 0 or not 5 <= int(text) <= 201:
+        raise typer.BadParameter(f"{text!r} must be odd, 5 to 201: a subset has a centre")
+    return int(text)
+
+
 def load_noise(text: str) -> float:
     """A standard deviation in N: none, or in the range of [noise] load_std_n."""
     return 0.0 if not_negative(text) == 0 else _within(text, 1e-6, 1e7, "N")
@@ -171,6 +183,26 @@ CmodRate = Annotated[
     float | None,
     option("--cmod-rate-mm-per-min", metavar="V", parser=positive, help="Gives a record without times its times."),
 ]
-NoisePx = Annotated[float, option("--noise-px", metavar="S", parser=pixel_noise, help="Noise of displacements (px).")]
+NoisePx = Annotated[
+    float | None,
+    option("--noise-px", metavar="S", parser=pixel_noise, help="Noise of displacement fields, in px (default: 0.01)."),
+]
+CameraScale = Annotated[
+    float | None,
+    option("--camera-mm-per-px", metavar="S", parser=pixel_pitch, help="Scale of speckle images (default: 0.0439)."),
+]
+NoiseGrey = Annotated[
+    float | None,
+    option("--noise-grey", metavar="S", parser=grey_noise, help="Noise of speckle images, of 255 (default: 2)."),
+]
+Frames = Annotated[
+    int | None, option("--frames", metavar="N", min=20, max=2000, help="Fields or images under load (default: 61).")
+]
+Subset = Annotated[
+    int | None, option("--subset", metavar="PX", parser=subset_size, help="Edge of a subset instead of the bundle's.")
+]
+Step = Annotated[
+    int | None, option("--step", metavar="PX", min=1, max=1000, help="Distance of subsets instead of the bundle's.")
+]
 LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=load_noise, help="Noise of the load (N).")]
 Version = Annotated[bool, option("--version", is_eager=True, callback=show_version, help="Show the version and exit.")]

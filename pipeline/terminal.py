@@ -79,14 +79,14 @@ class Display(AbstractContextManager["Display"]):
         """Name the next stage."""
         self._bar.say(name)
 
-    def begin(self, total: int, kept: int) -> None:
-        """Start counting simulations."""
+    def begin(self, total: int, kept: int, what: str = "simulation") -> None:
+        """Start counting simulations, or what else there is."""
         if kept:
-            self._bar.say(f"{kept} of {total} simulations are kept from an earlier run")
-        self._bar.begin(total, kept)
+            self._bar.say(f"{kept} of {total} {what}s are kept from an earlier run")
+        self._bar.begin(total, kept, what)
 
     def done(self, key: str) -> None:
-        """Count one simulation."""
+        """Count one."""
         self._bar.advance()
 
     def lost(self, key: str, error: BaseException) -> None:
@@ -103,15 +103,15 @@ class Display(AbstractContextManager["Display"]):
 class _Lines:
     """Progress for a file: a line a simulation."""
 
-    def begin(self, total: int, kept: int) -> None:
-        self.total, self._kept, self._count = total, kept, kept
+    def begin(self, total: int, kept: int, what: str) -> None:
+        self.total, self._kept, self._count, self._what = total, kept, kept, what
         self._start = time.monotonic()
 
     def advance(self) -> None:
         self._count += 1
         each = (time.monotonic() - self._start) / (self._count - self._kept)
         left = each * (self.total - self._count)
-        self.say(f"simulation {self._count} of {self.total}" + (f", about {_clock(left)} left" if left else ""))
+        self.say(f"{self._what} {self._count} of {self.total}" + (f", about {_clock(left)} left" if left else ""))
 
     def say(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -135,9 +135,9 @@ class _Bar(_Lines):
         )
         self._progress.start()
 
-    def begin(self, total: int, kept: int) -> None:
-        super().begin(total, kept)
-        self._task = self._progress.add_task("simulations", total=total, completed=kept, left="")
+    def begin(self, total: int, kept: int, what: str) -> None:
+        super().begin(total, kept, what)
+        self._task = self._progress.add_task(f"{what}s", total=total, completed=kept, left="")
 
     def advance(self) -> None:
         self._count += 1

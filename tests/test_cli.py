@@ -148,7 +148,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
         (COMMANDS["simulate"], ["--law", "exponential"]),
         (COMMANDS["simulate"], ["--effect", "creep=1"]),
         (COMMANDS["virtual_test"], ["--effect", "creep=1"]),
-        (COMMANDS["virtual_test"], ["--images"]),
         (COMMANDS["virtual_test"], ["--creep", "creep.csv"]),
     ],
 )

@@ -11,11 +11,11 @@ class Progress(Protocol):
     def stage(self, name: str) -> None:
         """The next stage of a command begins; `name` is a few words."""
 
-    def begin(self, total: int, kept: int) -> None:
-        """`total` simulations are wanted, `kept` of them lie in the store already."""
+    def begin(self, total: int, kept: int, what: str = "simulation") -> None:
+        """`total` of something are wanted, `kept` of them lie in the store already; `what` is one of them."""
 
     def done(self, key: str) -> None:
-        """The simulation `key` lies in the store."""
+        """The one called `key` lies in the store."""
 
     def lost(self, key: str, error: BaseException) -> None:
         """The process of `key` was lost; its simulation is tried once more."""
@@ -30,7 +30,7 @@ class Silent:
     def stage(self, name: str) -> None:
         """Say nothing."""
 
-    def begin(self, total: int, kept: int) -> None:
+    def begin(self, total: int, kept: int, what: str = "simulation") -> None:
         """Say nothing."""
 
     def done(self, key: str) -> None:

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 from pipeline.core.errors import StoreError
@@ -37,11 +38,35 @@ def write_atomically(path: Path, content: bytes) -> None:
     try:
         _write_synced(part, content)
         os.replace(part, path)
-        _sync_folder(path.parent)
+        _sync(path.parent)
     except OSError as error:
         raise refused(path, error) from error
     finally:
         with contextlib.suppress(OSError):  # no such folder, or read-only: then it was never made
+            part.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def written_aside(path: Path) -> Iterator[Path]:
+    """A name to write a large file under, which gets its own name when it is complete.
+
+    Raises
+    ------
+    StoreError
+        naming the file and what to do; nothing of the new file is left, an earlier one stands untouched
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}{SUFFIX}")
+    try:
+        yield part
+        _sync(part)
+        os.replace(part, path)
+        _sync(path.parent)
+    except StoreError:
+        raise
+    except OSError as error:
+        raise refused(path, error) from error
+    finally:
+        with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
 
 
@@ -58,9 +83,9 @@ def _write_synced(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def _sync_folder(folder: Path) -> None:
-    """Make the new name itself durable."""
-    handle = os.open(folder, os.O_RDONLY)
+def _sync(path: Path) -> None:
+    """Make a file, or the names in a folder, durable."""
+    handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import h5py
@@ -45,6 +46,47 @@ def read_fields(path: Path, default_std: float | None = None) -> DisplacementFie
 def write_fields(path: Path, field: DisplacementField) -> None:
     """Write a displacement field whose abscissa is time; raises StoreError where that is not possible."""
     write_atomically(path, encode_fields(field))
+
+
+def stream_fields(
+    path: Path, points: np.ndarray, time: np.ndarray, frames: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]
+) -> None:
+    """Write a displacement field frame by frame, one of which is in memory at a time.
+
+    Parameters
+    ----------
+    path : Path
+    points : (n, 2) array, m
+    time : (frames,) array, s
+    frames : displacement (n, 2) in m, valid (n,) and standard deviation (n,) in m of one frame after the other
+
+    Raises
+    ------
+    StoreError
+        naming the file and what to do; an earlier one stands untouched
+    """
+
+    def fill(file: h5py.File) -> None:
+        shape = (time.size, len(points))
+        wide = _growing(file, "displacement", (*shape, 2), "float64", "mm")
+        valid, std = _growing(file, "valid", shape, "bool", "1"), _growing(file, "std_mm", shape, "float64", "mm")
+        count = 0
+        for number, (moved, usable, spread) in enumerate(frames):
+            wide[number], valid[number], std[number] = moved / MM, usable, spread / MM
+            count += 1
+        if count != time.size:
+            raise StoreError(f"{path.name}: {count} frames came for {time.size} times")
+
+    FIELDS.write(path, {"points": points / MM, "time_s": time}, fill)
+
+
+def _growing(file: h5py.File, name: str, shape: tuple[int, ...], dtype: str, unit: str) -> h5py.Dataset:
+    """A compressed dataset, read and written a frame at a time."""
+    made = file.create_dataset(
+        name, shape, dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=True
+    )
+    made.attrs["unit"] = unit
+    return made
 
 
 def encode_fields(field: DisplacementField) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from pipeline.core.errors import MissingFileError, StoreError
+from pipeline.store.atomic import written_aside
 
 Shape = tuple[str | int, ...]
 
@@ -71,6 +72,28 @@ class Layout:
             _refuse(self.title, self.problems(file))
             file.flush()
             return bytes(file.id.get_file_image())
+
+    def write(self, path: Path, values: Mapping[str, Any], fill: Callable[[h5py.File], None]) -> None:
+        """Write a file too large to be held in memory: whole under another name first, then renamed.
+
+        Parameters
+        ----------
+        path : Path
+        values : some entries by name
+        fill : writes the other datasets into the open file
+
+        Raises
+        ------
+        StoreError
+            where it cannot be written or does not fit the layout
+        """
+        with written_aside(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as file:
+            file.attrs["format"] = self.format
+            for entry in self.entries:
+                if entry.name in values:
+                    _put(file, entry, values[entry.name])
+            fill(file)
+            _refuse(path.name, self.problems(file))
 
     def decode(self, path: Path) -> dict[str, Any]:
         """Values by entry name, None where an optional one is absent.

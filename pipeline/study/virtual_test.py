@@ -25,6 +25,7 @@ from pipeline.store.images import read_grey, read_labels
 from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
 from pipeline.store.results import plain
 from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_of
+from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
 from pipeline.twin.virtual_test import virtual_test as break_network
@@ -33,6 +34,8 @@ SPREAD = 0.12  # the truth lies within ± this share of the start, unless it is 
 PITCH = 1.9  # of the network, in particle radii: no lattice of the identifying side has it
 SECTION_MM_PER_PX, SECTION_MARGIN_PX = 0.1, 5  # of a synthetic section
 CAMERA_MM_PER_PX = 0.0439  # Hill et al. 2017, table 1
+FIELD_NOISE_PX, PIXEL_NOISE = 0.01, 2.0  # px, grey values of 0 to 255
+FRAMES = 61  # under load
 CMOD_MAX_MM = {"seb": 0.6, "dct": 0.65}  # beyond the paper's last station
 
 
@@ -49,7 +52,11 @@ class Request:
     f_max, delta_max : the truth, N per bond of the bundle's lattice and m
     start : (N, m) in the bundle's [start]
     radius_mm : of the bundle's lattice
-    noise_px, load_noise_n : standard deviations of displacement and load
+    noise_px, load_noise_n : standard deviations of displacement (of fields, px) and load (N)
+    images : speckle images instead of displacement fields
+    camera_mm_per_px : float; their scale
+    noise_grey : float; standard deviation of one of their pixels, in grey values of 0 to 255
+    frames : int; images or fields from the beginning of the loading to the end
     """
 
     geometry: str | None = None
@@ -60,12 +67,49 @@ class Request:
     delta_max: float | None = None
     start: tuple[float, float] | None = None
     radius_mm: float | None = None
-    noise_px: float = 0.01
+    noise_px: float | None = None
     load_noise_n: float = 5.0
+    images: bool = False
+    camera_mm_per_px: float | None = None
+    noise_grey: float | None = None
+    frames: int | None = None
+
+    def __post_init__(self) -> None:
+        of_images = {"--camera-mm-per-px": self.camera_mm_per_px, "--noise-grey": self.noise_grey}
+        others = {"--noise-px": self.noise_px} if self.images else of_images
+        given = [name for name, value in others.items() if value is not None]
+        if given:
+            what = "displacement fields, not to speckle images" if self.images else "speckle images: add --images"
+            raise InputError(f"{' and '.join(given)} belongs to {what}")
+
+    @property
+    def displacement_noise(self) -> float:
+        """px, of fields"""
+        return FIELD_NOISE_PX if self.noise_px is None else self.noise_px
+
+    @property
+    def pixel_noise(self) -> float:
+        """grey values, of images"""
+        return PIXEL_NOISE if self.noise_grey is None else self.noise_grey
+
+    @property
+    def camera_pitch(self) -> float:
+        """mm, of images"""
+        return self.camera_mm_per_px or CAMERA_MM_PER_PX
+
+    @property
+    def frame_count(self) -> int:
+        return self.frames or FRAMES
 
 
 def virtual_test(
-    out: Path, *, config: Path | None = None, seed: int | None = None, progress: Progress | None = None, **asked: Any
+    out: Path,
+    *,
+    config: Path | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    **asked: Any,
 ) -> str:
     """Make a bundle of a virtual test in OUT; the truth goes to OUT/truth.json, which no other command reads.
 
@@ -75,23 +119,24 @@ def virtual_test(
     seed : of section, network, truth and noise
     asked : fields of `Request`
     """
-    settings = settings_of(config, seed=seed)
+    settings = settings_of(config, seed=seed, workers=workers)
     request, progress = Request(**asked), progress or Silent()
-    of_section, of_truth, of_test = np.random.default_rng(settings.seed).spawn(3)
+    of_section, of_truth, of_test, of_camera = np.random.default_rng(settings.seed).spawn(4)
     progress.stage("drawing the specimen")
     experiment, images = prepare(request, out.resolve().name, of_section)
     write_bundle(out, experiment, images)
     bundle = read_bundle(out)
     truth = draw_truth(request, bundle, of_truth)
     progress.stage("breaking it")
-    test = run_test(bundle, truth, request, of_test)
-    noise = {"displacement_std_mm": request.noise_px * CAMERA_MM_PER_PX, "load_std_n": request.load_noise_n}
-    noted = {name: float(f"{value:.4g}") for name, value in noise.items() if value > 0}
-    section = experiment.noise.model_copy(update=noted)
-    finished = experiment.model_copy(update={"noise": section})
-    filled = Contents(test.curve, test.field)
-    write_bundle(out, finished, filled)
-    write_atomically(out / "truth.json", _truth_text(test, truth, request, settings, bundle))
+    clock = draw_clock(of_camera) if request.images else Clock()
+    test = run_test(bundle, truth, request, clock, of_test)
+    finished = with_noise(experiment, request)
+    if request.images:
+        film, finished = film_of(test, finished, request.camera_pitch, request.pixel_noise)
+        write_film(out, film, finished, test, clock, of_camera, settings.workers, progress)
+    else:
+        write_bundle(out, finished, Contents(test.curve, test.field))
+    write_atomically(out / "truth.json", _truth_text(test, truth, request, clock, settings, bundle))
     cmod, load = test.curve.peak()
     return f"virtual test of {test.particles} points and {test.bonds} bonds: peak {load:.0f} N at {cmod / MM:.3f} mm"
 
@@ -174,13 +219,27 @@ def draw_truth(request: Request, bundle: Bundle, rng: np.random.Generator) -> Tr
     return Truth(float(f_max), float(delta_max), bundle.model.radius)
 
 
-def run_test(bundle: Bundle, truth: Truth, request: Request, rng: np.random.Generator) -> VirtualTest:
+def with_noise(experiment: Experiment, request: Request) -> Experiment:
+    """The settings with the noise of the measurement, where the user could know it."""
+    known = {"load_std_n": request.load_noise_n}
+    if not request.images:  # that of images is for the correlation to find
+        known["displacement_std_mm"] = request.displacement_noise * CAMERA_MM_PER_PX
+    noted = {name: float(f"{value:.4g}") for name, value in known.items() if value > 0}
+    return experiment.model_copy(update={"noise": experiment.noise.model_copy(update=noted)})
+
+
+def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: np.random.Generator) -> VirtualTest:
     """Break an irregular network that stands for the bundle's specimen."""
     phase_map, _ = read_phases(bundle)
+    rate, end = bundle.loading.cmod_rate, bundle.loading.cmod_max or CMOD_MAX_MM[bundle.specimen.geometry] * MM
     recording = Recording(
-        cmod_rate=bundle.loading.cmod_rate,
-        cmod_max=bundle.loading.cmod_max or CMOD_MAX_MM[bundle.specimen.geometry] * MM,
-        displacement_std=request.noise_px * CAMERA_MM_PER_PX * MM,
+        cmod_rate=rate,
+        cmod_max=end,
+        frames=request.frame_count,
+        before=clock.before,
+        phase=clock.phase,
+        rest=LATEST + (clock.before + 1) * end / rate / (request.frame_count - 1) if request.images else 0.0,
+        displacement_std=request.displacement_noise * CAMERA_MM_PER_PX * MM,
         load_std=request.load_noise_n,
     )
     phase_at = one_phase if phase_map is None else phase_map.at
@@ -188,7 +247,9 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, rng: np.random.Gene
     return break_network(bundle.specimen, phase_at, mixture(bundle), truth, recording, pitch, rng, find_equilibria)
 
 
-def _truth_text(test: VirtualTest, truth: Truth, request: Request, settings: RunSettings, bundle: Bundle) -> bytes:
+def _truth_text(
+    test: VirtualTest, truth: Truth, request: Request, clock: Clock, settings: RunSettings, bundle: Bundle
+) -> bytes:
     """truth.json: what was put in, and how the network stands for it."""
     known = {
         "version": __version__,
@@ -199,8 +260,20 @@ def _truth_text(test: VirtualTest, truth: Truth, request: Request, settings: Run
         "seed": settings.seed,
         "network": {"pitch_mm": test.pitch / MM, "points": test.particles, "bonds": test.bonds},
         "factors": vars(test.factors),
-        "noise": {"displacement_px": request.noise_px, "mm_per_px": CAMERA_MM_PER_PX, "load_n": request.load_noise_n},
+        "noise": _noise(request),
+        "sync_offset_s": clock.offset,
         "factors_check": vars(test.check),
         "energy_error": test.solution.energy.error,
     }
     return (json.dumps(plain(known), indent=2, sort_keys=True) + "\n").encode()
+
+
+def _noise(request: Request) -> dict[str, float]:
+    """The noise that was put in."""
+    if request.images:
+        return {"grey": request.pixel_noise, "mm_per_px": request.camera_pitch, "load_n": request.load_noise_n}
+    return {
+        "displacement_px": request.displacement_noise,
+        "mm_per_px": CAMERA_MM_PER_PX,
+        "load_n": request.load_noise_n,
+    }

@@ -33,6 +33,9 @@ class Recording:
     cmod_rate : float, m/s
     cmod_max : float, m; end of the test
     frames : int; images, at equal times from the unloaded specimen to the end
+    before : int; more images of the unloaded specimen, before the loading begins
+    phase : float, 0 to 1; by this share of their distance the images are earlier than the start of the loading
+    rest : float, s; record before the loading begins
     sampling : float, 1/s; rows of the load record per second
     grid_step : float, m; distance of measured points
     roi : float, m; side of the square around the notch tip in which displacements are measured
@@ -44,6 +47,9 @@ class Recording:
     cmod_rate: float
     cmod_max: float
     frames: int = 61
+    before: int = 0
+    phase: float = 0.0
+    rest: float = 0.0
     sampling: float = 5.0
     grid_step: float = 1.5 * MM
     roi: float = 45 * MM
@@ -61,11 +67,28 @@ class Recording:
                 raise InputError(f"{name} = {getattr(self, name):g} {unit} of a virtual test must not be negative")
         if self.frames < 3:
             raise InputError(f"{self.frames} frames: a virtual test needs at least 3")
+        if self.before < 0 or not 0 <= self.phase <= 1 or not self.rest >= 0:
+            raise InputError(
+                f"before = {self.before}, phase = {self.phase:g}, rest = {self.rest:g} s of a virtual test: frames and "
+                "seconds before the loading must not be negative, the phase lies between 0 and 1"
+            )
 
     @property
     def frame_time(self) -> np.ndarray:
-        """(frames,) array, s."""
-        return np.linspace(0.0, self.cmod_max / self.cmod_rate, self.frames)
+        """(before + frames,) array, s, on the clock of the record."""
+        end = self.cmod_max / self.cmod_rate
+        step = end / (self.frames - 1)
+        early = -step * (np.arange(self.before, 0, -1) + self.phase)
+        return self.rest + np.concatenate([early, np.linspace(0.0, end, self.frames) - step * self.phase])
+
+    @property
+    def frame_cmod(self) -> np.ndarray:
+        """(before + frames,) array, m; zero before the loading."""
+        return self.cmod_at(self.frame_time)
+
+    def cmod_at(self, time: np.ndarray) -> np.ndarray:
+        """CMOD (m) at times (s): at rest, then a ramp."""
+        return np.maximum(time - self.rest, 0.0) * self.cmod_rate
 
 
 @dataclass(frozen=True)
@@ -80,7 +103,8 @@ class VirtualTest:
     factors : Factors of the network
     check : CutCheck; how well the network stands for the lattice, measured on cuts
     pitch : float, m
-    particles, bonds : int
+    loading_begins : float, s, on the clock of the record
+    problem : Problem; the network
     solution : Solution of the engine
     """
 
@@ -91,9 +115,17 @@ class VirtualTest:
     factors: Factors
     check: CutCheck
     pitch: float
-    particles: int
-    bonds: int
+    loading_begins: float
+    problem: Problem
     solution: Solution
+
+    @property
+    def particles(self) -> int:
+        return self.problem.particles.count
+
+    @property
+    def bonds(self) -> int:
+        return self.problem.bonds.count
 
 
 def virtual_test(
@@ -124,7 +156,7 @@ def virtual_test(
     factors = calibrated_factors() if factors is None else factors
     of_network, of_noise, of_cuts = rng.spawn(3)
     network = irregular_network(specimen, pitch, of_network)
-    stations = recording.frame_time[1:] * recording.cmod_rate
+    stations = recording.frame_cmod[recording.frame_cmod > 0]
     problem = twin_problem(
         specimen, network, phase_at, mixture, truth, factors, recording.cmod_max * (1 + 1e-6), stations
     )
@@ -140,8 +172,8 @@ def virtual_test(
         factors=factors,
         check=check_factors(network, factors, of_cuts),
         pitch=pitch,
-        particles=problem.particles.count,
-        bonds=problem.bonds.count,
+        loading_begins=recording.rest,
+        problem=problem,
         solution=solution,
     )
 
@@ -158,19 +190,21 @@ def measuring_points(specimen: Specimen, recording: Recording) -> np.ndarray:
 
 def _record(curve: LoadCurve, recording: Recording) -> LoadCurve:
     """The exact curve at the rows of the load record, the CMOD growing at its constant rate."""
-    time = np.arange(int(recording.cmod_max / recording.cmod_rate * recording.sampling) + 1) / recording.sampling
-    cmod = time * recording.cmod_rate
+    end = recording.rest + recording.cmod_max / recording.cmod_rate
+    time = np.arange(int(end * recording.sampling) + 1) / recording.sampling
+    cmod = recording.cmod_at(time)
     line = np.full(cmod.size, np.nan) if curve.load_line is None else np.interp(cmod, curve.cmod, curve.load_line)
     return LoadCurve(time=time, cmod=cmod, load=np.interp(cmod, curve.cmod, curve.load), load_line=line)
 
 
 def _film(problem: Problem, solution: Solution, recording: Recording) -> DisplacementField:
-    """Displacements of the measuring points in every frame, the first that of the unloaded specimen."""
+    """Displacements of the measuring points in every frame, the first ones those of the unloaded specimen."""
     points = measuring_points(problem.specimen, recording)
     parted = PARTED * problem.law.delta_max
     values, valid = observe(problem.particles, problem.bonds, solution.displacement, points, parted)
-    values = np.concatenate([np.zeros((1, len(points), 2)), np.where(valid[..., None], values, np.nan)])
-    valid = np.concatenate([valid[:1], valid])
+    still = int(np.count_nonzero(recording.frame_cmod == 0))
+    values = np.concatenate([np.zeros((still, len(points), 2)), np.where(valid[..., None], values, np.nan)])
+    valid = np.concatenate([np.repeat(valid[:1], still, axis=0), valid])
     time = recording.frame_time[: len(values)]
     return DisplacementField(points, values, valid, np.full(valid.shape, recording.displacement_std), time)
 
