@@ -12,6 +12,9 @@ from pipeline.dic.jumps import Jumps, Raster
 _STANDS_OUT = 8.0  # a ridge begins this many robust deviations above the field's own scatter of steps
 _SHARE = 0.05  # … and at this share of the largest step
 _BRIDGE = 7  # nodes; gaps in a crest that are bridged
+_SWING, _TRIALS = np.deg2rad(60.0), 61  # directions tried at the border, either way of straight on
+_CLEAR = 25.0  # variances of the rest by which another direction must be better
+_ON = 0.6  # nodes; so near to a line the side is not asked for
 _LEAST = 12  # nodes along a ridge that count as a crack
 
 
@@ -35,7 +38,7 @@ def ridge(found: Jumps, raster: Raster, mouth: np.ndarray | None) -> tuple[np.nd
         if nothing stands out of the noise
     """
     nodes, through = _directed(_strongest(found), found, raster, mouth)
-    nodes = _to_border(_centred(nodes, found), found, both=through)
+    nodes = _to_border(_centred(nodes, found), found, raster, both=through)
     return (nodes if through else _straight_end(nodes, found.reach)), through
 
 
@@ -120,7 +123,7 @@ def _centred(nodes: np.ndarray, found: Jumps) -> np.ndarray:
     return np.column_stack([np.interp(even, length, smooth[:, k]) for k in (0, 1)])
 
 
-def _to_border(nodes: np.ndarray, found: Jumps, *, both: bool) -> np.ndarray:
+def _to_border(nodes: np.ndarray, found: Jumps, raster: Raster, *, both: bool) -> np.ndarray:
     """Where a window reaches over the border of the field the path goes on straight; the mouth's end, or both."""
     last = np.array(found.size.shape) - 1.0
     for _ in range(2):
@@ -130,12 +133,45 @@ def _to_border(nodes: np.ndarray, found: Jumps, *, both: bool) -> np.ndarray:
             keep = nodes[inner[0] :]
             at = np.arange(2 * found.reach)
             slope = np.array([np.polyfit(at, keep[: at.size, k], 1)[0] for k in (0, 1)])
-            ahead = keep[0] - np.arange(4 * found.reach, 0, -1)[:, None] * slope / np.linalg.norm(slope)
+            out = _parting(raster, keep[0], -slope / np.linalg.norm(slope), found)
+            ahead = keep[0] + np.arange(4 * found.reach, 0, -1)[:, None] * out
             nodes = np.vstack([ahead[np.all((ahead >= 0) & (ahead <= last), axis=1)], keep])
         if not both:
             return nodes
         nodes = nodes[::-1]
     return nodes
+
+
+def _parting(raster: Raster, start: np.ndarray, straight: np.ndarray, found: Jumps) -> np.ndarray:
+    """The direction from a node in which a line parts the field best into two planes; straight on where none is better.
+
+    Parameters
+    ----------
+    raster : Raster
+    start : (2,) array; row, column
+    straight : (2,) array, unit vector; as the path came
+    found : Jumps
+    """
+    node = np.argwhere(raster.known)
+    arm = node - start
+    use = (arm @ straight > 0) & (np.hypot(*arm.T) < 4 * found.reach)
+    arm, value = arm[use], raster.displacement[tuple(node[use].T)]
+    best, least, first = straight, np.inf, np.inf
+    for turn in (0.0, *np.linspace(-_SWING, _SWING, _TRIALS)):
+        c, s = np.cos(turn), np.sin(turn)
+        way = straight @ np.array([[c, s], [-s, c]])
+        across = arm @ [-way[1], way[0]]
+        side = np.where(np.abs(across) < _ON, 0.0, np.sign(across))
+        basis = np.column_stack([np.ones(len(arm)), arm, side, arm * side[:, None]])[side != 0]
+        if min((side > 0).sum(), (side < 0).sum()) < 6:
+            continue
+        left = value[side != 0] - basis @ np.linalg.lstsq(basis, value[side != 0], rcond=None)[0]
+        square = float(np.mean(left**2))
+        first = square if turn == 0 else first
+        if square < least:
+            best, least = way, square
+    clear = (first - least) * 2 * len(arm) > _CLEAR * least
+    return best if clear else straight
 
 
 def _straight_end(nodes: np.ndarray, reach: int) -> np.ndarray:

@@ -72,6 +72,18 @@ def test_the_mouth_is_where_it_is_said_to_be():
     assert crack.length == pytest.approx(62, abs=6)
 
 
+def test_the_path_bends_with_the_crack_close_to_the_border():
+    course = 70.0 - 0.6 * np.maximum(76 - GRID[:, 1], 0)  # slanting, then straight down into the border
+    side = np.where(GRID[:, 0] > course, 0.5, -0.5)
+    opening = 0.4 + 0.01 * GRID[:, 1]
+    field = np.column_stack([side * opening, 0 * side]) + np.random.default_rng(4).normal(0, 0.01, GRID.shape)
+    crack = find_crack(GRID, field, mouth=np.array([70.0, 89.0]))
+    low = crack.path[:, 1] > 76
+    assert low.sum() > 8
+    assert np.abs(crack.path[low, 0] - 70).max() < 1.5  # nodes; straight on it would be off by eight
+    np.testing.assert_allclose(crack.opening[low], 0.4 + 0.01 * crack.path[low, 1], rtol=0.06)
+
+
 def test_a_smooth_field_has_no_crack():
     random = np.random.default_rng(0)
     field = np.column_stack([1e-3 * GRID[:, 0], np.sin(GRID[:, 0] / 30)]) + random.normal(0, 1e-3, GRID.shape)
