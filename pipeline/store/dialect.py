@@ -74,7 +74,7 @@ def read_block(path: Path) -> Block:
     if best.width < 2 or len(best.rows) < 3:
         raise InputError(
             f"{path.name}: no table of numbers was found (at least 2 columns and 3 rows): export the record as text "
-            "with columns for time, CMOD and load"
+            "with one column for each quantity, time among them"
         )
     rows = best.rows
     values = np.array([best.numbers[row] for row in rows], float)
@@ -122,8 +122,10 @@ def _guess(lines: list[str], separator: str, decimal: str) -> _Guess:
         cells = [line.split() for line in lines]
     else:
         cells = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])] for line in lines]
-    cells = [row[:-1] if len(row) > 2 and not row[-1] else row for row in cells]  # a separator at the end
     numbers = [_row_numbers(row, decimal) for row in cells]
+    if all(len(row) > 2 and not row[-1] for row, found in zip(cells, numbers, strict=True) if found):
+        cells = [row[:-1] if len(row) > 2 and not row[-1] else row for row in cells]  # a separator ends each line
+        numbers = [_row_numbers(row, decimal) for row in cells]
     widths = Counter(len(row) for row in numbers if row is not None)
     width = max(widths, key=lambda w: (widths[w], w), default=0)
     rows = [i for i, row in enumerate(numbers) if row is not None and len(row) == width]
