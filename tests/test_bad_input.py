@@ -292,7 +292,6 @@ HOPELESS = {
     "radius too large": (lambda bundle: None, ("--radius-mm", "8"), "particle_radius_mm = 8 is too large"),
     "radius too small": (lambda bundle: None, ("--radius-mm", "0.001"), "at most 5e+06 are taken"),
     "accuracy never reached": (lambda bundle: None, ("--accuracy", "1e-30"), "accuracy = 1e-30: should be"),
-    "no such engine yet": (lambda bundle: None, ("--engine", "reference"), "use lammps or equilibrium"),
     "no such settings": (lambda bundle: None, ("--config", "no.toml"), "no.toml does not exist"),
     "settings a folder": (lambda bundle: None, ("--config", "."), "cannot be read as TOML"),
 }

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.core.errors import StoreError
-
-
-@dataclass(frozen=True)
-class Frame:
-    """Positions and velocities (n, 2) of all particles at one step."""
-
-    step: int
-    position: np.ndarray
-    velocity: np.ndarray
+from pipeline.explicit.frames import Frame
 
 
 def read_curve(path: Path) -> dict[str, np.ndarray]:

@@ -7,11 +7,10 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import ConvergenceError, PipelineError, StoreError, ToolchainError
 from pipeline.core.problem import EnergyBalance, Problem, Solution
+from pipeline.explicit.frames import fields_at_stations
 from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.output import read_curve, read_frames, read_reached
 from pipeline.lmp.plugin import open_lammps
@@ -83,7 +82,8 @@ def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
             f"the gauge stopped at {cmod[-1] * 1e3:.4g} mm of {problem.cmod_max * 1e3:.4g} mm after "
             f"{curve['step'][-1]:.0f} steps: ask for less accuracy or a smaller cmod_max_mm"
         )
-    stations, displacement = _at_stations(problem, folder, curve)
+    frames = read_frames(folder / "frames.dump", problem.particles.count)
+    stations, displacement = fields_at_stations(problem, frames)
     return Solution(
         curve=LoadCurve(cmod / problem.cmod_rate, cmod, curve["load_n"], curve["load_line_m"]),
         cmod=stations,
@@ -97,18 +97,3 @@ def read_solution(problem: Problem, folder: Path, seconds: float) -> Solution:
         converged=True,
         message=f"the gauge reached {problem.cmod_max * 1e3:.4g} mm",
     )
-
-
-def _at_stations(problem: Problem, folder: Path, curve: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Full fields moved along their own velocity from the frame to the station before it."""
-    frames = read_frames(folder / "frames.dump", problem.particles.count)
-    moved = [frame.position - problem.particles.position for frame in frames]
-    opened = np.array([problem.gauge.cmod(field) for field in moved])
-    reached = problem.stations[problem.stations <= opened.max(initial=-np.inf)]
-    fields = []
-    for station in reached:
-        after = int(np.argmax(opened >= station))
-        speed = problem.gauge.cmod(frames[after].velocity)
-        late = (opened[after] - station) / speed if speed > 0 else 0.0
-        fields.append(moved[after] - late * frames[after].velocity)
-    return reached, np.array(fields)

@@ -19,10 +19,12 @@ class Engine:
     ----------
     label : str; name and versions: solutions of another version are not taken for these
     solve : Problem → Solution, picklable
+    expectation : Problem → what a run will cost, in words; None where there is nothing to warn of
     """
 
     label: str
     solve: Callable[[Problem], Solution]
+    expectation: Callable[[Problem], str] | None = None
 
 
 def engine(name: str) -> Engine:
@@ -43,4 +45,10 @@ def engine(name: str) -> Engine:
         from pipeline.equilibrium import solve
 
         return Engine(f"equilibrium, cohesive-bpm {__version__}", solve.solve)
-    raise UnavailableError(f"engine {name!r} is not available in version {__version__}: use lammps or equilibrium")
+    if name == "reference":
+        from pipeline.reference import solve as steps
+
+        return Engine(f"reference, cohesive-bpm {__version__}", steps.solve, steps.expectation)
+    raise UnavailableError(
+        f"engine {name!r} is not available in version {__version__}: use lammps, equilibrium or reference"
+    )

@@ -55,7 +55,8 @@ def simulate(
     store = SimulationStore(prepare_output(folder / "simulations"))
     key = problem_key(problem, chosen.label)
     progress = progress or Silent()
-    progress.stage("simulating")
+    cost = f": {chosen.expectation(problem)}" if chosen.expectation else ""
+    progress.stage(f"simulating{cost}")
     name = f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
     run_all(chosen.solve, {key: problem}, store, workers=1, progress=progress, names={key: name})
     solution = store.get(key)
