@@ -10,10 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.execution.progress import Progress
+from pipeline.core.units import MM
+from pipeline.execution.progress import Progress, Silent
+from pipeline.store.atomic import write_atomically
+from pipeline.store.bundle import read_bundle
+from pipeline.store.new import Contents, write_bundle
 from pipeline.store.results import read_result
+from pipeline.study.assembly import build_model
+from pipeline.study.engines import engine
+from pipeline.study.filming import Clock
 from pipeline.study.identify import identify
-from pipeline.study.virtual_test import virtual_test
+from pipeline.study.virtual_test import Request, draw_truth, prepare, recording_of, virtual_test, with_noise
+from pipeline.twin.virtual_test import exact_record, noisy_record
+
+DENSE_MM = {"columns_mm": tuple(1.5 * k for k in range(-14, 15) if k), "rows_mm": tuple(1.5 * k for k in range(-6, 14))}
 
 
 @dataclass(frozen=True)
@@ -51,9 +61,52 @@ def twin_trial(folder: Path, seed: int, objective: str, progress: Progress | Non
     objective : as of `identify`
     how : radius_mm and others of `virtual_test`
     """
-    bundle, out = folder / f"twin-{seed}", folder / f"identified-{seed}"
+    bundle, out = folder / f"twin-{seed}", folder / f"identified-{seed}-{objective}"
     if not (bundle / "truth.json").is_file():
         virtual_test(bundle, seed=seed, progress=progress, **how)
+    return _identified(bundle, out, seed, objective, progress)
+
+
+def same_lattice_trial(
+    folder: Path, seed: int, objective: str, progress: Progress | None = None, *, dense: bool = False, **how: Any
+) -> Trial:
+    """Identify a test that was broken on the identifying lattice itself: noise and interpolation are what remains.
+
+    Parameters
+    ----------
+    folder, seed, objective, how : as of `twin_trial`
+    dense : compare all measured points around the notch tip instead of the paper's sixteen
+    """
+    name = f"same-{seed}{'-dense' if dense else ''}"
+    bundle, out = folder / name, folder / f"identified-{name}-{objective}"
+    if not (bundle / "truth.json").is_file():
+        same_lattice_test(bundle, seed, Request(**how), dense, progress or Silent())
+    return _identified(bundle, out, seed, objective, progress)
+
+
+def same_lattice_test(out: Path, seed: int, request: Request, dense: bool, progress: Progress) -> None:
+    """A bundle like that of a virtual test, but of the model that identifies it, solved by LAMMPS."""
+    of_section, of_truth, of_noise = np.random.default_rng(seed).spawn(3)
+    experiment, images = prepare(request, out.name, of_section)
+    if dense:
+        places = experiment.observation.model_copy(update=DENSE_MM)
+        experiment = experiment.model_copy(update={"observation": places})
+    write_bundle(out, experiment, images)
+    bundle = read_bundle(out)
+    truth, recording = draw_truth(request, bundle, of_truth), recording_of(bundle, request, Clock())
+    frames = recording.frame_cmod[recording.frame_cmod > 0]
+    problem = build_model(bundle).problem(
+        truth.f_max, truth.delta_max, frames=frames, cmod_max=recording.cmod_max * (1 + 1e-6)
+    )
+    progress.stage("breaking it")
+    solution = engine("lammps").solve(problem)
+    curve, field = noisy_record(*exact_record(problem, solution, recording), recording, of_noise)
+    write_bundle(out, with_noise(experiment, request), Contents(curve, field))
+    known = {"f_max_n": truth.f_max, "delta_max_m": truth.delta_max, "radius_mm": truth.radius / MM}
+    write_atomically(out / "truth.json", json.dumps(known).encode())
+
+
+def _identified(bundle: Path, out: Path, seed: int, objective: str, progress: Progress | None) -> Trial:
     identify(bundle, out, objective=objective, progress=progress)
     return compare(f"seed {seed}", json.loads((bundle / "truth.json").read_text("utf-8")), read_result(out))
 

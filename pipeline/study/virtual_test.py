@@ -228,11 +228,10 @@ def with_noise(experiment: Experiment, request: Request) -> Experiment:
     return experiment.model_copy(update={"noise": experiment.noise.model_copy(update=noted)})
 
 
-def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: np.random.Generator) -> VirtualTest:
-    """Break an irregular network that stands for the bundle's specimen."""
-    phase_map, _ = read_phases(bundle)
+def recording_of(bundle: Bundle, request: Request, clock: Clock) -> Recording:
+    """How machine and camera record the test."""
     rate, end = bundle.loading.cmod_rate, bundle.loading.cmod_max or CMOD_MAX_MM[bundle.specimen.geometry] * MM
-    recording = Recording(
+    return Recording(
         cmod_rate=rate,
         cmod_max=end,
         frames=request.frame_count,
@@ -242,6 +241,12 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
         displacement_std=request.displacement_noise * CAMERA_MM_PER_PX * MM,
         load_std=request.load_noise_n,
     )
+
+
+def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: np.random.Generator) -> VirtualTest:
+    """Break an irregular network that stands for the bundle's specimen."""
+    phase_map, _ = read_phases(bundle)
+    recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
     pitch = PITCH * bundle.model.radius
     return break_network(bundle.specimen, phase_at, mixture(bundle), truth, recording, pitch, rng, find_equilibria)

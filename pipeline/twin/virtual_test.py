@@ -162,11 +162,11 @@ def virtual_test(
     )
     problem = replace(problem, cmod_rate=recording.cmod_rate)
     solution = solve(problem)
-    curve = _record(solution.curve, recording)
-    field = _film(problem, solution, recording)
+    curve, field = exact_record(problem, solution, recording)
+    noisy_curve, noisy_field = noisy_record(curve, field, recording, of_noise)
     return VirtualTest(
-        curve=_noisy_curve(curve, recording, of_noise),
-        field=_noisy_field(field, recording, of_noise),
+        curve=noisy_curve,
+        field=noisy_field,
         exact_curve=curve,
         exact_field=field,
         factors=factors,
@@ -176,6 +176,18 @@ def virtual_test(
         problem=problem,
         solution=solution,
     )
+
+
+def exact_record(problem: Problem, solution: Solution, recording: Recording) -> tuple[LoadCurve, DisplacementField]:
+    """What machine and camera see of a solution whose frames are the recording's, without noise."""
+    return _record(solution.curve, recording), _film(problem, solution, recording)
+
+
+def noisy_record(
+    curve: LoadCurve, field: DisplacementField, recording: Recording, rng: np.random.Generator
+) -> tuple[LoadCurve, DisplacementField]:
+    """A record with the white noise of clip gauge, load cell and correlation."""
+    return _noisy_curve(curve, recording, rng), _noisy_field(field, recording, rng)
 
 
 def measuring_points(specimen: Specimen, recording: Recording) -> np.ndarray:
