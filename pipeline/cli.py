@@ -37,6 +37,10 @@ from pipeline.options import (
     Scale,
     Seed,
     Start,
+    Step,
+    Subset,
+    Temperature,
+    Times,
     TrueDeltaMax,
     TrueFMax,
     Version,
@@ -115,6 +119,28 @@ def model(
             from pipeline.study.model import model as build
 
             summary = build(bundle, out, radius_mm=radius_mm, config=config, progress=progress)
+        finish(summary, out)
+
+
+@app.command()
+def dic(
+    bundle: Bundle,
+    out: Out,
+    subset: Subset = None,
+    step: Step = None,
+    config: Config = None,
+    workers: Workers = None,
+    seed: Seed = None,
+    debug: Debug = False,
+) -> None:
+    """Measure displacements, crack path and opening in a test's speckle images."""
+    with exit_codes(debug):
+        with Display() as progress:
+            from pipeline.study.dic import dic as correlate
+
+            summary = correlate(
+                bundle, out, subset_px=subset, step_px=step, config=config, workers=workers, progress=progress
+            )
         finish(summary, out)
 
 

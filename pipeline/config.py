@@ -26,6 +26,12 @@ def _increasing(factors: tuple[float, ...]) -> tuple[float, ...]:
     return factors
 
 
+def _odd(value: int) -> int:
+    if value % 2 == 0:
+        raise ValueError("must be odd: a subset has a centre")
+    return value
+
+
 Factor = Annotated[float, Field(gt=0, le=10)]
 Factors = Annotated[tuple[Factor, ...], Field(strict=False, min_length=3, max_length=15), AfterValidator(_increasing)]
 
@@ -67,6 +73,15 @@ class RunSettings(BaseModel):
         description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",
     )
     viscoelastic: bool = Field(default=False, description="Burgers bonds from creep.csv")
+    subset_size_px: Annotated[int, Field(ge=5, le=201), AfterValidator(_odd)] | None = Field(
+        default=None, description="edge of a subset of the image correlation instead of the bundle's"
+    )
+    grid_step_px: Annotated[int, Field(ge=1, le=1000)] | None = Field(
+        default=None, description="distance of subset centres instead of the bundle's"
+    )
+    search_px: Annotated[int, Field(ge=0, le=2000)] = Field(
+        default=100, description="motion from one image to the next within which a lost point is looked for"
+    )
     levelling: bool = Field(default=False, description="simulated fields go through the same image correlation")
 
     @property

@@ -24,6 +24,7 @@ COMMANDS = {
     "new": ["new", "B", "--geometry", "seb"],
     "check": ["check", "B"],
     "model": ["model", "B", "-o", "O"],
+    "dic": ["dic", "B", "-o", "O"],
     "simulate": ["simulate", "B", "-o", "O", "--f-max", "71", "--delta-max", "1.14e-4"],
     "identify": ["identify", "B", "-o", "O"],
     "virtual_test": ["virtual-test", "O"],

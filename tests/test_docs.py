@@ -21,7 +21,7 @@ from pipeline.cli import app
 from pipeline.equilibrium.path import Increments
 from pipeline.explicit import loading
 from pipeline.store.fields import read_fields
-from pipeline.study import identify, model, observation, simulate, virtual_test
+from pipeline.study import dic, identify, model, observation, simulate, virtual_test
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
@@ -143,7 +143,14 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "function",
-    [identify.identification_result, simulate.simulate, simulate.test_result, model.model, virtual_test._truth_text],
+    [
+        identify.identification_result,
+        simulate.simulate,
+        simulate.test_result,
+        model.model,
+        virtual_test._truth_text,
+        dic.dic_result,
+    ],
 )
 def test_every_key_of_a_result_is_explained(function):
     named = set(re.findall(r"`(\w+)`", (ROOT / "docs" / "bundle.md").read_text("utf-8")))

@@ -9,7 +9,7 @@ from pipeline.core.field import DisplacementField
 
 
 def opening(
-    field: DisplacementField, left: np.ndarray, right: np.ndarray, reach: float
+    field: DisplacementField, left: np.ndarray, right: np.ndarray, reach: float, shared: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of one gauge point against the other, along the line between them.
 
@@ -20,6 +20,7 @@ def opening(
     field : DisplacementField
     left, right : (2,) arrays, m; feet of the gauge
     reach : float, m
+    shared : float, m; edge of a subset: the errors of points nearer to each other go together as their subsets overlap
 
     Returns
     -------
@@ -43,13 +44,13 @@ def opening(
                 f"only {int(near.sum())} points lie within {reach * 1e3:g} mm of the gauge foot at "
                 f"({foot[0] * 1e3:g}, {foot[1] * 1e3:g}) mm: enlarge the reach or move the foot into the picture"
             )
-        value, spread = _foot(field, near, foot, along)
+        value, spread = _foot(field, near, foot, along, shared)
         total, variance = total + sign * value, variance + spread
     return total, np.sqrt(variance)
 
 
 def _foot(
-    field: DisplacementField, near: np.ndarray, foot: np.ndarray, along: np.ndarray
+    field: DisplacementField, near: np.ndarray, foot: np.ndarray, along: np.ndarray, shared: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement along the gauge (frames,) and its variance, from a plane through the valid points of each frame."""
     value, variance = np.full(len(field.abscissa), np.nan), np.full(len(field.abscissa), np.nan)
@@ -61,5 +62,14 @@ def _foot(
             continue
         weight = np.linalg.pinv(basis)[0]
         value[frame] = weight @ (field.displacement[frame][use] @ along)
-        variance[frame] = np.sum((weight * field.std[frame][use]) ** 2)
+        error = weight * field.std[frame][use]
+        variance[frame] = error @ _overlap(field.points[use], shared) @ error
     return value, variance
+
+
+def _overlap(points: np.ndarray, edge: float) -> np.ndarray:
+    """Share (n, n) that square subsets around points (n, 2) have in common: the correlation of their errors."""
+    if edge <= 0:
+        return np.eye(len(points))
+    apart = np.abs(points[:, None] - points) / edge
+    return np.prod(np.clip(1 - apart, 0, None), axis=2)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pipeline.study.measurement import Series
 
 FEET = 12  # points that a foot of the gauge needs on its side
-STEPS = 5  # grid steps that a foot reaches
+SUBSETS = 2  # edges of a subset that a foot reaches
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,8 @@ def notch_opening(specimen: Specimen, series: Series, factor: float) -> Opening 
     factor : float; on the standard deviations
     """
     points = series.view.point(series.grid.points)
-    step = series.settings.grid_step_px * series.view.metre_per_px
-    reach = max(STEPS * step, specimen.gauge_length / 2)
+    edge = series.settings.subset_size_px * series.view.metre_per_px
+    reach = max(min(SUBSETS * edge, specimen.notch_length), specimen.gauge_length / 2)
     half = specimen.gauge_length / 2
     height = _height(points[series.ever], specimen, half, reach)
     if height is None:
@@ -90,7 +90,7 @@ def notch_opening(specimen: Specimen, series: Series, factor: float) -> Opening 
         field = DisplacementField(
             points[near], moved[None], r.valid[near][None], np.nan_to_num(spread)[None], np.zeros(1)
         )
-        (value[frame.number],), (std[frame.number],) = opening(field, feet[0], feet[1], reach)
+        (value[frame.number],), (std[frame.number],) = opening(field, feet[0], feet[1], reach, edge)
     return Opening(value, std, height, bool(abs(height - specimen.gauge_y) < 1e-9))
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import __version__
+from pipeline.config import RunSettings
 from pipeline.core.errors import ConvergenceError, InputError, MissingFileError
 from pipeline.core.field import DisplacementField, rigid_motion
 from pipeline.dic.camera import View
@@ -79,13 +80,16 @@ class Series:
         return found
 
 
-def settings_of(bundle: Bundle, subset_px: int | None, step_px: int | None, threads: int | None) -> Settings:
-    """How a bundle's images are correlated: as [dic] says, options over it."""
+def correlation_settings(bundle: Bundle, run: RunSettings) -> Settings:
+    """How a bundle's images are correlated: as [dic] says, settings of the run over it."""
     own = bundle.dic
     settings = Settings(
-        subset_size_px=subset_px or own.subset_size_px, grid_step_px=step_px or own.grid_step_px, roi_px=own.roi_px
+        subset_size_px=run.subset_size_px or own.subset_size_px,
+        grid_step_px=run.grid_step_px or own.grid_step_px,
+        roi_px=own.roi_px,
+        search_px=run.search_px,
     )
-    return replace(settings, threads=threads) if threads else settings
+    return replace(settings, threads=run.workers) if run.workers else settings
 
 
 def correlate_series(bundle: Bundle, folder: Path, settings: Settings, progress: Progress) -> Series:
@@ -170,11 +174,16 @@ def _resume(tracker: Tracker, series: Series, kept: int) -> None:
 
 
 def crack_of(result: Correlation, mouth: np.ndarray) -> Crack | None:
-    """The crack in a frame, in px, from the end nearest to the mouth (2,) on; None where none stands out."""
+    """The crack in a frame, in px, from the end nearest to the mouth (2,) on; None where none stands out.
+
+    A step across which the field closes more than it slides is no crack, but noise or a fold of the field.
+    """
     try:
-        return find_crack(result.points, np.nan_to_num(result.displacement), result.valid, mouth=mouth)
+        found = find_crack(result.points, np.nan_to_num(result.displacement), result.valid, mouth=mouth)
     except (ConvergenceError, InputError):  # no crack, or a field too small to show one
         return None
+    opening, sliding = (float(np.nanmedian(v)) for v in (found.opening, found.sliding))
+    return None if opening < 0 and abs(sliding) < -opening else found
 
 
 @dataclass(frozen=True, eq=False)
