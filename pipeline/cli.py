@@ -220,6 +220,25 @@ def identify(
         finish(summary, out)
 
 
+@app.command()
+def creep(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Creep compliance, units in the column titles.")],
+    out: Out,
+    temperature_c: Temperature = None,
+    times: Times = None,
+    workers: Workers = None,
+    seed: Seed = None,
+    debug: Debug = False,
+) -> None:
+    """Turn creep compliance into a Burgers model and its relaxation modulus."""
+    with exit_codes(debug):
+        with Display() as progress:
+            from pipeline.study.creep import creep as fit
+
+            summary = fit(file, out, temperature_c=temperature_c, window=times, progress=progress)
+        finish(summary, out)
+
+
 @app.command("virtual-test")
 def virtual_test(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Bundle to make.")],

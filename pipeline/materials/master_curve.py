@@ -20,7 +20,6 @@ from pipeline.core.errors import InputError
 from pipeline.materials.residuals import inflation
 from pipeline.materials.series_fit import creep_design, dynamic_system, not_negative, refuse_data, spaced_times
 
-PER_DECADE = 2.0  # terms a decade: what ripples they leave lies below any scatter
 FEWEST = 3  # readings a temperature
 CONFIDENCE = 0.95
 STEP = 1e-4  # decades; of the numerical slope, above the round-off of the projection
@@ -118,7 +117,7 @@ def _shifted(
     rough = sign * np.concatenate([[0.0], np.cumsum([step for step, _ in steps])])
     rough = rough - rough[zero]
     first = x * 10 ** (sign * rough[group])
-    terms = spaced_times(first.min() / 10, first.max() * 10, PER_DECADE)
+    terms = spaced_times(first.min() / 10, first.max() * 10)
     free = np.arange(levels.size) != zero
 
     def whole(shift: np.ndarray) -> np.ndarray:

@@ -156,3 +156,24 @@ DIC = Layout(
         Entry("crack/closing_m", ("k",), "m", "opening made monotone towards the tip", optional=True),
     ),
 )
+
+CREEP = Layout(
+    "results.h5 of creep",
+    (
+        Entry("measured/time_s", ("readings",), "s", "as read"),
+        Entry("measured/compliance_per_pa", ("readings",), "1/Pa", "as read"),
+        Entry("measured/temperature_c", ("readings",), "°C", "as read", optional=True),
+        Entry("measured/reduced_time_s", ("readings",), "s", "time at the temperature of the results"),
+        Entry("fit/time_s", ("rows",), "s", "where the curves are given"),
+        Entry("fit/compliance_per_pa", ("rows",), "1/Pa", "creep compliance of the Burgers model"),
+        Entry("fit/compliance_95_per_pa", ("rows", 2), "1/Pa", "its 95 % band"),
+        Entry("fit/modulus_pa", ("rows",), "Pa", "relaxation modulus of the Burgers model"),
+        Entry("fit/modulus_95_pa", ("rows", 2), "Pa", "its 95 % band"),
+        Entry("fit/log_covariance", (4, 4), "1", "of the logarithms of d1, d2, eta1, tau2"),
+        Entry("prony/compliance_per_pa", ("rows",), "1/Pa", "creep compliance of the series"),
+        Entry("prony/modulus_pa", ("rows",), "Pa", "relaxation modulus of the series"),
+        Entry("master/temperature_c", ("temperatures",), "°C", "measured ones", optional=True),
+        Entry("master/log10_shift", ("temperatures",), "1", "log₁₀ a_T, 0 at the reference", optional=True),
+        Entry("master/covariance", ("temperatures", "temperatures"), "1", "of log₁₀ a_T", optional=True),
+    ),
+)

@@ -69,6 +69,26 @@ def virtual_test_folder(out: Path) -> Iterator[None]:
                 out.rmdir()
 
 
+def plain_folder(out: Path, command: str) -> Path:
+    """Make OUT for results that belong to no bundle, refuse one that holds a bundle or another command's results.
+
+    Raises
+    ------
+    InputError, StoreError
+        naming the folder and what to do
+    """
+    out = Path(out)
+    if (out / FILE).exists():
+        raise InputError(f"{out} is a bundle: results get a folder of their own, choose another -o")
+    try:
+        other = read_result(out).get("command")
+    except (MissingFileError, StoreError, OSError, AttributeError):
+        other = None
+    if other not in (None, command):
+        raise InputError(f"{out} holds results of the command {other}, they would be lost: choose another -o")
+    return prepare_output(out)
+
+
 def _owner(out: Path) -> str | None:
     """The bundle whose results lie in a folder, None where there are none or nobody can tell."""
     try:

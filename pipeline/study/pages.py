@@ -35,7 +35,7 @@ def model_page(folder: Path, model: Model, result: Mapping[str, Any]) -> None:
         Number("stones", f"{report.stones}", f"aggregate {report.aggregate_fraction:.1%} of the particles"),
     ]
     sections = [Section("The model", numbers=numbers, figures=[_microstructure(folder, model)], notes=model.remarks)]
-    _write(folder, page(model.bundle.name, sections, subtitle="bonded-particle model", footer=_footer(result)))
+    write_page(folder, page(model.bundle.name, sections, subtitle="bonded-particle model", footer=_footer(result)))
 
 
 def simulation_page(
@@ -44,10 +44,10 @@ def simulation_page(
     """One simulated test: curve, energies, crack."""
     measured = model.bundle.curve
     figures = [
-        _picture(folder, "load_cmod", lambda a: load_cmod(a, measured, {"simulated": solution.curve}), "Load–CMOD."),
-        _picture(folder, "energy", lambda a: energy_balance(a, solution.energy), "Where the machine's work went."),
+        picture(folder, "load_cmod", lambda a: load_cmod(a, measured, {"simulated": solution.curve}), "Load–CMOD."),
+        picture(folder, "energy", lambda a: energy_balance(a, solution.energy), "Where the machine's work went."),
         _damage(folder, problem, solution),
-        _picture(
+        picture(
             folder,
             "displacement",
             lambda a: displacement_map(
@@ -60,7 +60,7 @@ def simulation_page(
     ]
     sections = [Section("One fracture test", numbers=_test_numbers(result), figures=figures, notes=model.remarks)]
     title = f"f_max = {result['f_max_n']:.4g} N, delta_max = {result['delta_max_m']:.4g} m"
-    _write(folder, page(model.bundle.name, sections, subtitle=title, footer=_footer(result)))
+    write_page(folder, page(model.bundle.name, sections, subtitle=title, footer=_footer(result)))
 
 
 def identification_page(
@@ -75,8 +75,8 @@ def identification_page(
     """The estimate, how well it fits, and how far to trust it."""
     curve = model.bundle.need_curve()
     fit = [
-        _picture(folder, "objective", lambda a: objective_surface(a, found), "Objective over the grid, its optimum."),
-        _picture(
+        picture(folder, "objective", lambda a: objective_surface(a, found), "Objective over the grid, its optimum."),
+        picture(
             folder,
             "load_cmod",
             lambda a: load_cmod(a, curve, {"simulated at the optimum": optimum.curve}, measured.cmod),
@@ -91,7 +91,7 @@ def identification_page(
     subtitle = f"identified from {found.settings.objective.value} by {found.objective.size} simulations"
     notes = [*found.warnings, *([] if found.interior else ["The optimum lies on the edge of the grid."])]
     html = page(model.bundle.name, sections, subtitle=subtitle, warnings=notes, footer=_footer(result))
-    _write(folder, html)
+    write_page(folder, html)
 
 
 def _field_sections(folder: Path, model: Model, measured: Measured, found: Estimate) -> list[Section]:
@@ -120,7 +120,7 @@ def _field_sections(folder: Path, model: Model, measured: Measured, found: Estim
         if used[k].any()
     ]
     panels = _panels(folder, "fields", draw, "Displacements at the observation points, measured and at the optimum.")
-    difference = _picture(
+    difference = picture(
         folder,
         "difference",
         lambda a: difference_by_station(a, measured.cmod, field.displacement, against, used, noise),
@@ -181,15 +181,16 @@ def _microstructure(folder: Path, model: Model) -> Figure:
     def draw(axes: Any) -> Any:
         return phases(axes, model.bundle.specimen, model.particles)
 
-    return _picture(folder, "microstructure", draw, "Particles of the model by phase.", wide=True)
+    return picture(folder, "microstructure", draw, "Particles of the model by phase.", wide=True)
 
 
 def _damage(folder: Path, problem: Problem, solution: Solution) -> Figure:
     caption = "Bonds on their softening branch: 0 at the peak force, 1 broken."
-    return _picture(folder, "damage", lambda a: bond_damage(a, problem, solution.reached), caption, wide=True)
+    return picture(folder, "damage", lambda a: bond_damage(a, problem, solution.reached), caption, wide=True)
 
 
-def _picture(folder: Path, name: str, draw: Draw, caption: str, wide: bool = False) -> Figure:
+def picture(folder: Path, name: str, draw: Draw, caption: str, wide: bool = False) -> Figure:
+    """Draw a figure, write it beside the results and return it for the page."""
     image = png(draw, width=WIDE["width"], height=WIDE["height"]) if wide else png(draw)
     write_atomically(folder / f"{name}.png", image)
     return Figure(image, caption, wide)
@@ -206,5 +207,6 @@ def _footer(result: Mapping[str, Any]) -> list[str]:
     return [f"cohesive-bpm {result['version']}, command {result['command']}{engine}"]
 
 
-def _write(folder: Path, html: str) -> None:
+def write_page(folder: Path, html: str) -> None:
+    """Write report.html, whole or not at all."""
     write_atomically(folder / "report.html", html.encode())

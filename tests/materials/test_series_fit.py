@@ -23,7 +23,7 @@ def literature(folder, name):
 
 
 def test_times_are_evenly_spread_over_decades():
-    assert spaced_times(0.1, 1000.0) == pytest.approx([0.1, 1, 10, 100, 1000], rel=1e-14)  # powers
+    assert spaced_times(0.1, 1000.0, 1.0) == pytest.approx([0.1, 1, 10, 100, 1000], rel=1e-14)  # powers
     assert spaced_times(2.0, 2.0).tolist() == [2.0]
     with pytest.raises(InputError, match="must be positive and increase"):
         spaced_times(10.0, 1.0)
@@ -37,7 +37,7 @@ def test_a_series_is_found_again_with_its_own_times():
 
 
 def test_a_term_a_decade_follows_other_times_to_a_percent():
-    chain = fit_creep(TIME, MASTIC.creep_compliance(TIME), spaced_times(1.0, 1000.0))
+    chain = fit_creep(TIME, MASTIC.creep_compliance(TIME), spaced_times(1.0, 1000.0, 1.0))
     difference = chain.creep_compliance(TIME) / MASTIC.creep_compliance(TIME) - 1
     assert np.abs(difference).max() < 0.01  # measured: 0.6 %
     modulus = relaxation_of(chain).relaxation_modulus(TIME) - MASTIC.relaxation_modulus(TIME)
