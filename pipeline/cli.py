@@ -191,7 +191,9 @@ def identify(
     accuracy: Accuracy = None,
     fields: Fields = None,
     viscoelastic: Annotated[bool, option("--viscoelastic", help="Let the mastic creep.")] = False,
-    levelling: Annotated[bool, option("--levelling", help="Level the estimate for the grid's resolution.")] = False,
+    levelling: Annotated[
+        bool, option("--levelling", help="Correlate simulated fields as the measured ones were.")
+    ] = False,
     config: Config = None,
     workers: Workers = None,
     seed: Seed = None,
@@ -200,7 +202,7 @@ def identify(
     """Estimate f_max and delta_max of the mastic from a test."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(viscoelastic=viscoelastic, levelling=levelling)
+            refuse_until_built(viscoelastic=viscoelastic)
             from pipeline.study.identify import identify as estimate
 
             summary = estimate(
@@ -212,6 +214,7 @@ def identify(
                 radius_mm=radius_mm,
                 accuracy=accuracy,
                 fields=fields,
+                levelling=levelling or None,
                 config=config,
                 workers=workers,
                 seed=seed,

@@ -146,7 +146,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
     ("line", "option"),
     [
         (COMMANDS["identify"], ["--viscoelastic"]),
-        (COMMANDS["identify"], ["--levelling"]),
         (COMMANDS["simulate"], ["--law", "exponential"]),
         (COMMANDS["simulate"], ["--effect", "creep=1"]),
         (COMMANDS["virtual_test"], ["--effect", "creep=1"]),
@@ -173,7 +172,7 @@ def test_options_reach_the_study(study):
         "--seed",
         "3",
     ]
-    more = ["--accuracy", "0.02", "--fields", "f.h5", "--config", "c.toml", "--workers", "2"]
+    more = ["--accuracy", "0.02", "--fields", "f.h5", "--config", "c.toml", "--workers", "2", "--levelling"]
     assert run("identify", "B", "-o", "O", *options, *more).exit_code == 0
     told = dict(study.options)
     assert study.args == (Path("B"), Path("O"))
@@ -185,6 +184,7 @@ def test_options_reach_the_study(study):
         "radius_mm": 0.6,
         "accuracy": 0.02,
         "fields": Path("f.h5"),
+        "levelling": True,
         "config": Path("c.toml"),
         "workers": 2,
         "seed": 3,

@@ -177,3 +177,13 @@ CREEP = Layout(
         Entry("master/covariance", ("temperatures", "temperatures"), "1", "of log₁₀ a_T", optional=True),
     ),
 )
+
+LEVELLED = Layout(
+    "levelled/*.h5 of identify",
+    (
+        Entry("points_m", ("points", 2), "m", "where fields are compared"),
+        Entry("displacement_m", ("frames", "points", 2), "m", "as correlation sees the simulation; NaN: none found"),
+    ),
+)
+
+_ROW = ("entries",)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import StoreError, UnavailableError
+from pipeline.core.errors import StoreError
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import ligament_area
 from pipeline.core.units import MM
@@ -28,9 +28,12 @@ from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
+from pipeline.study.dic import FOLDER as DIC_FOLDER
+from pipeline.study.dic import measured_fields, with_measured_fields
 from pipeline.study.engines import Engine
 from pipeline.study.engines import engine as engine_of
-from pipeline.study.observation import at_stations, measured_test
+from pipeline.study.levelling import Leveller, leveller, refuse_unlevelled
+from pipeline.study.observation import at_stations, measured_test, observe_solution
 from pipeline.study.output import results_folder
 from pipeline.study.pages import identification_page
 from pipeline.study.prospects import refuse_hopeless
@@ -51,6 +54,7 @@ class Campaign:
     store : SimulationStore
     progress : Progress
     used : keys of the simulations that took part so far; the store may hold others
+    leveller : Leveller, or None: simulations are observed as they are
     """
 
     model: Model
@@ -61,6 +65,7 @@ class Campaign:
     store: SimulationStore
     progress: Progress
     used: set[str]
+    leveller: Leveller | None = None
 
     def problem(self, f_max: float, delta_max: float) -> Problem:
         """The test at one node of the grid."""
@@ -78,6 +83,20 @@ class Campaign:
         )
         self.used.update(wanted)
         return self.kept(nodes)
+
+    def seen(self, runs: list[tuple[Problem, Solution]]) -> list[np.ndarray]:
+        """Displacements (s, p, 2) in m of the points at the stations, one array a simulation."""
+        if self.leveller is not None:
+            self.progress.begin(len(runs), 0, "levelled simulation")
+        found = []
+        for problem, solution in runs:
+            if self.leveller is None:
+                values = observe_solution(problem, solution, self.points)
+            else:
+                values = self.leveller.seen(problem, solution)
+                self.progress.done("levelled")
+            found.append(at_stations(values, solution, self.measured.cmod))
+        return found
 
     def kept(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """The nodes as the store holds them, in order; refuses where one is missing."""
@@ -101,6 +120,7 @@ def identify(
     radius_mm: float | None = None,
     accuracy: float | None = None,
     fields: Path | None = None,
+    levelling: bool | None = None,
     config: Path | None = None,
     workers: int | None = None,
     seed: int | None = None,
@@ -114,23 +134,27 @@ def identify(
     ----------
     bundle, out : folders
     fields : a field file instead of the bundle's own
+    levelling : send simulated fields through the correlation before they are compared
     the others : override the settings of `config`
     """
     started = time.monotonic()
     options = {"engine": engine, "grid": grid, "objective": objective, "radius_mm": radius_mm}
-    options |= {"accuracy": accuracy, "workers": workers, "seed": seed}
+    options |= {"accuracy": accuracy, "workers": workers, "seed": seed, "levelling": levelling or None}
     settings = settings_of(config, **options)
     chosen = engine_of(settings.engine)
     read = read_bundle(bundle, fields)
     aim = choose_objective(read, settings.objective)
+    refuse_unlevelled(read, settings, aim)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
+    read = from_images(model, aim, folder, settings, progress or Silent())
     field = read.need_fields() if aim is not Objective.LOAD else None
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
     refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(prepare_output(folder / "simulations"))
-    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent(), set())
+    level = leveller(read, settings, points, folder, chosen.label) if settings.levelling else None
+    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent(), set(), level)
     found = search(campaign, aim)
     problem, optimum = run_optimum(campaign, found)
     result = identification_result(campaign, found, problem, optimum, time.monotonic() - started)
@@ -141,15 +165,23 @@ def identify(
 
 
 def choose_objective(bundle: Bundle, wanted: str | None) -> Objective:
-    """What to compare: as asked, else fields where there are some, else the load."""
-    if bundle.images and bundle.fields is None and wanted != "load":
-        raise UnavailableError(
-            f"{bundle.name} has speckle images but no fields.h5: image correlation is not in this version; "
-            "give --fields FILE, or --objective load"
-        )
+    """What to compare: as asked, else fields where there are some or images of them, else the load."""
     if wanted is not None:
         return Objective(wanted)
-    return Objective.LOAD if bundle.fields is None else Objective.FIELDS
+    return Objective.FIELDS if bundle.images or bundle.fields is not None else Objective.LOAD
+
+
+def from_images(model: Model, aim: Objective, folder: Path, settings: RunSettings, progress: Progress) -> Bundle:
+    """The bundle, with the fields of its images where fields are compared; these are kept in FOLDER/dic.
+
+    What can be refused without the fields is refused before they are measured.
+    """
+    bundle = model.bundle
+    if not bundle.images or aim is Objective.LOAD:
+        return bundle
+    bare = measured_test(bundle.need_curve(), None, bundle.stations, bundle.observation_points)
+    refuse_hopeless(model, bare, Objective.LOAD, Rigid(settings.rigid))
+    return with_measured_fields(bundle, measured_fields(bundle, folder / DIC_FOLDER, settings, progress))
 
 
 def search(campaign: Campaign, aim: Objective) -> Estimate:
@@ -176,7 +208,7 @@ def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
     loads = [solution.curve.load_at(stations) for _, solution in runs]
     seen = None
     if aim is not Objective.LOAD:
-        seen = [at_stations(problem, solution, campaign.points, stations) for problem, solution in runs]
+        seen = campaign.seen(runs)
     simulated = Simulated.of(design, seen, loads)
     how = Settings(aim, campaign.settings.modulus_std, Rigid(campaign.settings.rigid))
     return estimate(design, simulated, campaign.measured, how)
@@ -245,7 +277,7 @@ def identification_arrays(campaign: Campaign, found: Estimate, optimum: Solution
     measured, field = campaign.measured, campaign.measured.field
     runs = campaign.kept(found.design.nodes())
     shape = found.design.shape
-    seen = [at_stations(p, s, campaign.points, measured.cmod) for p, s in runs] if field is not None else None
+    seen = campaign.seen(runs) if field is not None else None
     return {
         "grid/f_max_n": found.design.f_max,
         "grid/delta_max_m": found.design.delta_max,

@@ -22,10 +22,12 @@ def observe_solution(problem: Problem, solution: Solution, points: np.ndarray) -
     return values
 
 
-def at_stations(problem: Problem, solution: Solution, points: np.ndarray, stations: np.ndarray) -> np.ndarray:
-    """Displacements (s, p, 2) in m at CMOD stations; NaN where a station was not reached."""
-    values = observe_solution(problem, solution, points)
-    found = np.full((stations.size, len(points), 2), np.nan)
+def at_stations(values: np.ndarray, solution: Solution, stations: np.ndarray) -> np.ndarray:
+    """Displacements (s, p, 2) in m at CMOD stations, from those in the frames of a solution (frames, p, 2).
+
+    NaN where a station was not reached.
+    """
+    found = np.full((stations.size, *values.shape[1:]), np.nan)
     for k, station in enumerate(stations):
         hit = np.flatnonzero(np.isclose(solution.cmod, station, rtol=1e-9, atol=0))
         if hit.size:

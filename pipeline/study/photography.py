@@ -77,15 +77,19 @@ class Sheet:
         found = order[np.minimum(np.searchsorted(key[order], wanted), key.size - 1)]
         return edges, np.where(key[found] == wanted, found, -1)
 
-    def moved(self, displacement: np.ndarray) -> MovedMesh:
-        """The sheet after displacements (n, 2) in m of the particles."""
+    def torn(self, displacement: np.ndarray) -> np.ndarray:
+        """Edges (t, 2) of the mesh that do not hold after displacements (n, 2) in m of the particles."""
         edges, bond = self._edges
         one, two = self.problem.bonds.pairs.T
-        position = self.problem.particles.position
-        before, now = position[two] - position[one], (position + displacement)[two] - (position + displacement)[one]
-        parted = np.abs(np.hypot(*now.T) - np.hypot(*before.T)) > PARTED * self.problem.law.delta_max
-        torn = (bond < 0) | parted[bond]
-        return self.mesh.moved(self.view.pixel_vector(displacement), edges[torn])
+        before = self.problem.particles.position
+        now = before + displacement
+        change = np.abs(np.hypot(*(now[two] - now[one]).T) - np.hypot(*(before[two] - before[one]).T))
+        parted = change > PARTED * self.problem.law.delta_max
+        return edges[(bond < 0) | parted[bond]]
+
+    def moved(self, displacement: np.ndarray) -> MovedMesh:
+        """The sheet after displacements (n, 2) in m of the particles."""
+        return self.mesh.moved(self.view.pixel_vector(displacement), self.torn(displacement))
 
 
 @dataclass(frozen=True, eq=False)
