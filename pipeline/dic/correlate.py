@@ -17,10 +17,16 @@ from pipeline.dic.seeds import find
 from pipeline.dic.settings import Settings
 from pipeline.dic.status import Status
 
+_LEAST_SPAN, _MOST_SPAN = 1e-4, 1e12  # of the grey values: against the largest, and in all
+_LEAST_LEVELS = 8  # grey values; a photograph of 3 bits
+_OTHER_LIGHT = 0.12  # share of the region of interest that may be saturated in one picture only
 _ROUNDS = 4  # of seeding: parts that no neighbour reaches get seeds of their own
 _SEEDS = 9
+_ROUNDING = 1e-9  # share of the grey values' variance that single precision may lose
 _UNUSUAL = 3.0  # noisy pictures: points fail only when they scatter so many times more than their like
-_OUTCOMES = np.array([Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED])
+_OUTCOMES = np.array(
+    [*(Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED, Status.SATURATED)]
+)
 
 
 def checked(image: np.ndarray, what: str, like: np.ndarray | None = None) -> np.ndarray:
@@ -49,8 +55,21 @@ def checked(image: np.ndarray, what: str, like: np.ndarray | None = None) -> np.
             f"{what} has {image.shape[1]} × {image.shape[0]} px, the reference {like.shape[1]} × {like.shape[0]}: "
             "pictures of one test must have one size"
         )
-    if np.ptp(image) == 0:
-        raise InputError(f"{what} is blank: every pixel has the grey value {image.flat[0]:g}")
+    low, high = float(image.min()), float(image.max())
+    if low == high:
+        raise InputError(f"{what} is blank: every pixel has the grey value {low:g}")
+    if not _LEAST_SPAN * max(-low, high) < high - low < _MOST_SPAN:
+        raise InputError(
+            f"{what} has grey values from {low:.9g} to {high:.9g}, which single precision cannot hold: subtract what "
+            "they have in common and scale them to 16 bits"
+        )
+    if np.unique(image[:: max(1, image.shape[0] // 128), :: max(1, image.shape[1] // 128)]).size < _LEAST_LEVELS:
+        levels = np.unique(image).size
+        if levels < _LEAST_LEVELS:
+            raise InputError(
+                f"{what} has {levels} different grey values, which tell no displacement: use the photograph as the "
+                "camera took it"
+            )
     return np.ascontiguousarray(image, np.float32)
 
 
@@ -96,6 +115,7 @@ def correlate(reference: np.ndarray, deformed: np.ndarray, settings: Settings | 
 
 def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Correlation | None) -> Correlation:
     """The whole chain: propagate, learn the noise, cut what one warp does not explain, judge."""
+    _same_light(match, reference, current)
     found = _from_start(match, start) if start is not None else _unreached(match.grid.size)
     drift = np.zeros(2) if start is None or not start.valid.any() else np.median(start.warp[start.valid, :2], axis=0)
     rounds = 1 if start is not None and _good(match, found).any() else _ROUNDS
@@ -103,16 +123,33 @@ def matched(match: Match, reference: np.ndarray, current: np.ndarray, start: Cor
     good = _good(match, found)
     if good.sum() < max(1, 0.02 * good.size):
         raise ConvergenceError(
-            f"only {int(good.sum())} of {good.size} points of the reference are found in the picture: the motion may "
-            f"be larger than search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
+            f"only {int(good.sum())} of {good.size} points of the reference{match.reference.range.remark(reference)} "
+            f"are found in the picture{match.current.range.remark(current)}: the motion may be larger than "
+            f"search_px = {match.settings.search_px}, or the pictures do not show the same speckle"
         )
     noise = MatchNoise.learnt(found["residual"][good], found["count"][good], found["score"][good])
+    noise = noise.at_least(_ROUNDING * float(np.median(found["contrast"][good] / found["count"][good])))
     sheet = _sheet(match, found, noise)
     if match.settings.split:
         part(match, sheet, noise)
     else:
         _accept_whole(sheet, found, good, noise)
     return _correlation(match, sheet, noise)
+
+
+def _same_light(match: Match, reference: np.ndarray, current: np.ndarray) -> None:
+    """Refuse a picture of which so much more or less is saturated that its speckle has other shapes."""
+    column, row, width, height = match.settings.roi_px or (0, 0, reference.shape[1], reference.shape[0])
+    pictures = ((match.reference, reference), (match.current, current))
+    before, now = (
+        float(np.mean(grey[row : row + height, column : column + width] >= picture.range.ceiling))
+        for picture, grey in pictures
+    )
+    if abs(now - before) > _OTHER_LIGHT:
+        raise ConvergenceError(
+            f"{now:.0%} of the picture is saturated, of the reference {before:.0%}: light that the camera cannot tell "
+            "apart cannot be compared, photograph the whole test with the same, lower exposure"
+        )
 
 
 def _unreached(n: int) -> dict[str, np.ndarray]:
@@ -198,6 +235,7 @@ def _search(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Those spots that are found again, and their warps (k, 6)."""
     half = match.settings.half + 8
+    reference, current = match.reference.range.calmed(reference), match.current.range.calmed(current)
     seeds, guesses = [], []
     for spot in spots:
         carried = match.carried[spot] if match.carried is not None else np.zeros(6)

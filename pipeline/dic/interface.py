@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.dic.library import MATCHED, PARTED, PatternStruct, PictureStruct, SettingsStruct, call, library
+from pipeline.dic.saturation import Range
 
 
 def _table(array: np.ndarray, width: int, rule: str, kind: Any = float, length: int | None = None) -> np.ndarray:
@@ -39,15 +40,23 @@ def _named(records: np.ndarray) -> dict[str, np.ndarray]:
 
 
 class Picture:
-    """A picture (rows, columns) of grey values, ready to be correlated."""
+    """A picture (rows, columns) of grey values, ready to be correlated; its saturated pixels are left out."""
 
     def __init__(self, grey: np.ndarray) -> None:
         grey = np.ascontiguousarray(grey, np.float32)
         if grey.ndim != 2:
             raise InputError(f"a picture has rows and columns, got an array of shape {grey.shape}")
         self.shape: tuple[int, int] = (grey.shape[0], grey.shape[1])
+        self.range = Range.of(grey) if grey.size else Range()
         self._as_parameter_ = POINTER(PictureStruct)()
-        call("dic_new_picture", grey, *grey.shape, ctypes.byref(self._as_parameter_))
+        call(
+            "dic_new_picture",
+            grey,
+            *grey.shape,
+            self.range.floor,
+            self.range.ceiling,
+            ctypes.byref(self._as_parameter_),
+        )
         _freed_with(self, "dic_free_picture")
 
 

@@ -6,7 +6,7 @@ The interpreter is free for other threads while a call runs.
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_double, c_int32, c_int64
+from ctypes import POINTER, c_double, c_float, c_int32, c_int64
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.ctypeslib import ndpointer
 
 from pipeline.core.errors import InputError
 
-VERSION = 1  # DIC_INTERFACE
+VERSION = 2  # DIC_INTERFACE
 _TEXT = 256  # DIC_TEXT
 _ERRORS: dict[int, type[Exception]] = {1: InputError, 2: MemoryError}
 
@@ -68,7 +68,7 @@ def _array(kind: Any, *, optional: bool = False) -> Any:
 _DOUBLES, _MAYBE, _FLOATS, _INTS = _array("f8"), _array("f8", optional=True), _array("f4"), _array("i4")
 _PAIR = (POINTER(PictureStruct), POINTER(PictureStruct), _DOUBLES, c_int64)
 _CHECKED: dict[str, tuple[Any, ...]] = {
-    "dic_new_picture": (_FLOATS, c_int64, c_int64, POINTER(POINTER(PictureStruct))),
+    "dic_new_picture": (_FLOATS, c_int64, c_int64, c_float, c_float, POINTER(POINTER(PictureStruct))),
     "dic_new_pattern": (_DOUBLES, c_int64, POINTER(POINTER(PatternStruct))),
     "dic_evaluate": (POINTER(PatternStruct), _DOUBLES, c_int64, c_int32, _FLOATS),
     "dic_propagate": (*_PAIR, _INTS, _INTS, _DOUBLES, c_int64, _MAYBE, POINTER(SettingsStruct), _array(MATCHED)),

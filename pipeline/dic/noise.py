@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,10 @@ class MatchNoise:
         white = middle * np.sqrt(2 / max(float(np.median(count)) - PARAMETERS, 1))
         scale = float(np.median(score)) / _SCORE_MEDIAN
         return cls(max(middle, 1e-12), max(1.0, float(below / max(white, 1e-12))), max(1.0, scale))
+
+    def at_least(self, variance: float) -> MatchNoise:
+        """The same noise, but not below a variance (grey²)."""
+        return replace(self, variance=max(self.variance, variance))
 
     def limit(self, count: np.ndarray) -> np.ndarray:
         """Greatest variance (grey²) that noise explains in subsets of `count` pixels (n,)."""

@@ -19,6 +19,7 @@ from pipeline.dic.status import Status
 
 _SECTORS = 12
 _WAVES = 4
+_SATURATED = 5  # Outcome of cpp/subset.hpp
 _GAIN = 36.0  # χ² that a cut must save: 1 in 1000 under white noise, for six parameters and the search of the line
 _BENT = 0.75  # share of the saving from which second-order terms explain it; they explain at most 0.55 of a step
 _SIDE = 25.0  # χ² by which the centre's side must be preferred
@@ -50,6 +51,11 @@ class Sheet:
     def sound(self) -> np.ndarray:
         return self.status <= Status.SPLIT
 
+    @property
+    def open(self) -> np.ndarray:
+        """Points that a cut may help."""
+        return ~self.sound & (self.status != Status.OUTSIDE)
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -68,7 +74,7 @@ class Match:
 
 def part(match: Match, sheet: Sheet, noise: MatchNoise) -> None:
     """Cut the points of `sheet` that are not sound, in waves from their sound neighbours; changes `sheet`."""
-    open_points = np.flatnonzero(~sheet.sound & (sheet.status != Status.OUTSIDE))
+    open_points = np.flatnonzero(sheet.open)
     tried = np.full((len(sheet.status), _SECTORS), -2)
     for _ in range(_WAVES):
         chosen = _neighbours(match, sheet, open_points)
@@ -83,7 +89,7 @@ def part(match: Match, sheet: Sheet, noise: MatchNoise) -> None:
         _try_whole(match, sheet, noise, open_points, chosen)
         left = ~sheet.sound[open_points]
         _try_cut(match, sheet, noise, open_points[left], chosen[left])
-        open_points = np.flatnonzero(~sheet.sound & (sheet.status != Status.OUTSIDE))
+        open_points = np.flatnonzero(sheet.open)
 
 
 def _neighbours(match: Match, sheet: Sheet, of: np.ndarray) -> np.ndarray:
@@ -140,6 +146,7 @@ def _try_whole(match: Match, sheet: Sheet, noise: MatchNoise, points: np.ndarray
         accept=match.settings.accept_zncc,
         **match.settings.solver(),
     )
+    sheet.status[points[found["outcome"] == _SATURATED]] = Status.SATURATED
     adopt(sheet, points, found, noise, better=True)
 
 
@@ -219,7 +226,7 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     sheet.status[points] = np.select(
         [whole, fits & saves & one_piece & told, fits & saves & one_piece, fits & saves],
         [Status.OK, Status.SPLIT, Status.ON_CRACK, Status.TWO_CRACKS],
-        Status.POOR_MATCH,
+        np.where(sheet.status[points] == Status.SATURATED, Status.SATURATED, Status.POOR_MATCH),
     )
     cut = sheet.status[points] == Status.SPLIT
     to = points[cut]

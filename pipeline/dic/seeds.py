@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+_FLAT = 1e-9  # of the variance; where there is less, round-off is all that is left
 _UNIQUE = 0.1  # by so much ZNCC the best place must beat every other one
 
 
@@ -72,7 +73,7 @@ def _correlate(window: np.ndarray, patch: np.ndarray) -> np.ndarray:
     product = fft.rfft2(window, size) * np.conj(fft.rfft2(patch, size))
     overlap = fft.irfft2(product, size)[: valid[0], : valid[1]]
     total, square = _box(window, rows, columns), _box(window**2, rows, columns)
-    energy = np.maximum(square - total**2 / patch.size, 1e-6 * patch.size)
+    energy = np.maximum(square - total**2 / patch.size, _FLAT * np.var(window) * patch.size)
     return overlap / np.sqrt(energy * np.sum(patch**2))
 
 

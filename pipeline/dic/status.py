@@ -18,6 +18,7 @@ class Status(IntEnum):
     TWO_CRACKS = 15
     ON_CRACK = 16
     OUTLIER = 17
+    SATURATED = 18
 
     @property
     def failed(self) -> bool:
@@ -39,4 +40,5 @@ _SENTENCES = {
     Status.TWO_CRACKS: "failed: more than one crack in the subset",
     Status.ON_CRACK: "failed: the centre lies on the crack, its side cannot be told",
     Status.OUTLIER: "failed: contradicts the neighbours on its own side",
+    Status.SATURATED: "failed: less than half of the subset is not saturated",
 }

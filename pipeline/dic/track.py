@@ -99,6 +99,12 @@ class Tracker:
             image = grey if base[0] == number else checked(base[1], f"frame {base[0]}", like=self._first)
             self._base = _Base(image, core().Picture(image), base[2])
 
+    def keep(self, result: Correlation) -> None:
+        """Go on from the last result in another form, as it was rounded for a file, say: a series that is taken up
+        again from such files is then the same to the last bit."""
+        assert self._before is not None, "nothing was followed yet"
+        self._before = (*self._before[:2], result)
+
     def follow(self, frame: np.ndarray) -> Correlation:
         """The next frame against frame 0.
 
@@ -115,7 +121,8 @@ class Tracker:
         start = _ahead(self._before[2], self._earlier) if self._before else None
         result, renewed = self._found(picture, grey, start, number)
         if result is None:
-            raise ConvergenceError(f"frame {number}: the speckle of the frame before is not found again")
+            remark = picture.range.remark(grey)
+            raise ConvergenceError(f"frame {number}{remark}: the speckle of the frame before is not found again")
         self.sound = max(0.0 if renewed else self.sound, _share(result, self._shape))
         self._earlier = self._before[2] if self._before else None
         self._before, self.number = (grey, picture, result), number

@@ -159,7 +159,13 @@ def test_values_between_the_points(smooth, matched):
 @pytest.mark.parametrize(
     ("picture", "message"),
     [
-        (np.zeros((150, 150)), "blank"),
+        (np.zeros((150, 150)), "blank: every pixel has the grey value 0"),
+        (np.full((150, 150), 255, np.uint8), "blank: every pixel has the grey value 255"),
+        (np.indices((150, 150)).sum(axis=0) % 2 * 255, "2 different grey values"),
+        (1e8 + np.random.default_rng(0).normal(size=(150, 150)), "single precision"),
+        (1e15 * np.random.default_rng(0).normal(size=(150, 150)), "single precision"),
+        (np.zeros((150, 150), complex), "type complex"),
+        (np.zeros(150), "1 dimensions"),
         (np.zeros((150, 150, 3)), "3 dimensions"),
         (np.full((150, 150), "a"), "type"),
         (np.ones((8, 8)), "at least 16"),
@@ -182,5 +188,6 @@ def test_unrelated_pictures_are_refused(one_core):
 def test_impossible_settings_are_all_named():
     with pytest.raises(InputError, match=r"subset_size_px .* 24; .*model .* 'quartic'"):
         Settings(subset_size_px=24, model="quartic")
+    noise = np.random.default_rng(0).normal(size=(100, 100))
     with pytest.raises(InputError, match="reaches outside"):
-        correlate(np.eye(100), np.eye(100), Settings(roi_px=(0, 0, 101, 50)))
+        correlate(noise, noise, Settings(roi_px=(0, 0, 101, 50)))

@@ -207,5 +207,5 @@ def test_a_damaged_library_says_the_same(elsewhere):
 def test_a_library_built_from_other_sources_is_not_used(elsewhere, monkeypatch):
     shutil.copy(Path(pipeline.__file__).parent / "dic" / "libcorrelate.so", elsewhere)
     monkeypatch.setattr(library, "VERSION", 99)
-    with pytest.raises(ToolchainError, match="has interface 1, 99 is needed"):
+    with pytest.raises(ToolchainError, match=r"has interface \d+, 99 is needed"):
         core()

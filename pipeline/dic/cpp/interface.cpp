@@ -133,11 +133,12 @@ std::vector<Candidate> candidates_of(const double *rows, std::int32_t begin, std
 
 int32_t dic_interface(void) { return DIC_INTERFACE; }
 
-int32_t dic_new_picture(const float *grey, int64_t rows, int64_t columns, dic_picture **made, char *text) {
+int32_t dic_new_picture(const float *grey, int64_t rows, int64_t columns, float floor, float ceiling,
+                        dic_picture **made, char *text) {
   return guarded(text, [&] {
     need(rows >= 8 && columns >= 8, "a picture needs 8 rows and 8 columns");
     need(rows < kLargest && columns < kLargest, "a picture has fewer than 1073741824 rows and columns");
-    *made = new dic_picture{Picture(grey, int(rows), int(columns))};
+    *made = new dic_picture{Picture(grey, int(rows), int(columns), floor, ceiling)};
   });
 }
 

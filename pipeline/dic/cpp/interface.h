@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define DIC_INTERFACE 1 /* counts up whenever something below changes */
+#define DIC_INTERFACE 2 /* counts up whenever something below changes */
 #define DIC_TEXT 256    /* bytes of every `text` */
 #define DIC_API __attribute__((visibility("default")))
 
@@ -44,7 +44,10 @@ typedef struct {
 
 DIC_API int32_t dic_interface(void);
 
-DIC_API int32_t dic_new_picture(const float *grey, int64_t rows, int64_t columns, dic_picture **made, char *text);
+/* Grey values up to `floor` and from `ceiling` on are those of too little and too much light; infinities where there
+   is neither. */
+DIC_API int32_t dic_new_picture(const float *grey, int64_t rows, int64_t columns, float floor, float ceiling,
+                                dic_picture **made, char *text);
 DIC_API void dic_free_picture(dic_picture *picture);
 
 /* A speckle pattern of blobs: column, row, sigma and grey of each. */

@@ -24,7 +24,7 @@ PointResult solve(const Task &task, int i, const Warp &guess, Worker &worker) {
     r.fit.outcome = Outcome::Outside;
     return r;
   }
-  r.fit = fit(worker.pixels, *task.current, task.points[i], guess, task.settings, worker.bench);
+  r.fit = fit_seen(worker.pixels, *task.current, task.points[i], guess, task.settings, worker.bench);
   r.count = worker.pixels.count;
   if (r.fit.outcome != Outcome::Converged || r.fit.zncc <= task.accept) return r;
   const float *error = worker.bench.error.data();

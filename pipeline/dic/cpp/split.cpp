@@ -42,11 +42,15 @@ struct Cut {
 };
 
 // The map of one candidate; a motion that leaves the picture matches nothing.
-void fill_cost(const Pixels &p, const Picture &current, Point centre, const Candidate &c, double variance, double clip,
-               Bench &bench, Maps &maps, int k) {
-  if (misfit(p, current, centre, c.warp, c.gain, c.offset, bench) < 0) return maps.fill(k, float(clip));
+void fill_cost(const Pixels &p, const Picture &current, Point centre, const Candidate &c, double variance,
+               const SplitSettings &settings, Bench &bench, Maps &maps, int k) {
+  const float clip = float(settings.clip);
+  if (misfit(p, current, centre, c.warp, c.gain, c.offset, bench) < 0) return maps.fill(k, clip);
   for (int i = 0; i < p.count; ++i)
-    maps.at(k, i) = std::min(float(bench.error[i] * bench.error[i] / variance), float(clip));
+    maps.at(k, i) = std::min(float(bench.error[i] * bench.error[i] / variance), clip);
+  if (p.blind.empty() && !limited_about(current, centre, c.warp, settings.fit.half)) return;
+  for (int i = 0; i < p.count; ++i)  // what cannot be seen speaks neither for nor against
+    if (blind(p, i, current, centre, c.warp)) maps.at(k, i) = 1;
 }
 
 // Sums of every map over strips along the direction (nx, ny).
@@ -153,7 +157,8 @@ bool match_side(const Part &part, const Line &line, double sign, double margin, 
   if (count < kLeastFar) return false;
   Settings s = part.settings;
   if (count < kLeastAffine) s.model = Model::Translation;
-  out = fit(w.part, part.current, part.centre, start.warp, s, w.bench, prior);
+  out = fit_seen(w.part, part.current, part.centre, start.warp, s, w.bench, prior);
+  count = w.part.count;
   return out.outcome == Outcome::Converged && out.zncc > 0.3;
 }
 
@@ -183,7 +188,7 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
   Maps maps(int(candidates.size()) + 1, n);
   r.single = std::numeric_limits<double>::max();
   for (int k = 0; k + 1 < maps.rows; ++k) {
-    fill_cost(work.all, current, centre, candidates[k], variance, settings.clip, work.bench, maps, k);
+    fill_cost(work.all, current, centre, candidates[k], variance, settings, work.bench, maps, k);
     r.single = std::min(r.single, maps.total(k));
   }
   const int none = maps.rows - 1;
@@ -205,8 +210,8 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
     near = seen(r.near);
     r.far_matched = far_known && match_side(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond);
     if (r.far_matched) far = seen(r.far);
-    fill_cost(work.all, current, centre, near, variance, settings.clip, work.bench, two, 0);
-    if (far_known) fill_cost(work.all, current, centre, far, variance, settings.clip, work.bench, two, 1);
+    fill_cost(work.all, current, centre, near, variance, settings, work.bench, two, 0);
+    if (far_known) fill_cost(work.all, current, centre, far, variance, settings, work.bench, two, 1);
     cut = best_cut(work.all, two, half, 48, 0.5, 0, far_known ? 1 : 2, work.strips);
     distances(work.all, cut.line, 1, work.distance);
     near_margin = band(work.distance, two, 0, 1.0);

@@ -1,6 +1,7 @@
 // The pixels of a subset, or of a part of it, and their match in another picture.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "picture.hpp"
@@ -35,8 +36,11 @@ struct Settings {
 struct Pixels {
   int count = 0, padded = 0;
   std::vector<float> xi, eta, grey, dx, dy, mask;
+  std::vector<std::uint8_t> blind, dark;  // see picture.hpp; empty where the picture has neither
   void resize(int n);
   void keep(const std::vector<float> &signed_distance, double margin, Pixels &kept) const;  // those below −margin
+  void move(int from, int to);
+  void shrink(int n);  // to the first n pixels
 };
 
 struct Point {
@@ -48,7 +52,7 @@ struct Point {
 bool gather(const Picture &picture, Point centre, int half, const Warp *from, const Warp *far, const Line *line,
             Pixels &out);
 
-enum class Outcome : int { Converged = 0, NotConverged = 1, Outside = 2, NoContrast = 3, Lost = 4 };
+enum class Outcome : int { Converged = 0, NotConverged = 1, Outside = 2, NoContrast = 3, Lost = 4, Saturated = 5 };
 
 struct Fit {
   Warp warp;
@@ -80,6 +84,17 @@ bool sample(const Spline &spline, const Pixels &pixels, Point centre, const Warp
 // Inverse-compositional Gauss–Newton on ZNSSD (Baker & Matthews 2004; Pan, Li & Tong 2013); leaves e in bench.error.
 Fit fit(const Pixels &pixels, const Picture &current, Point centre, const Warp &guess, const Settings &settings,
         Bench &bench, const Prior *prior = nullptr);
+
+// May a pixel of the subset that the warp carries into the picture be blind or dark there?
+bool limited_about(const Picture &picture, Point centre, const Warp &warp, int half);
+
+// Is a pixel saturated, or beside one that is, here or where the warp carries it?
+bool blind(const Pixels &pixels, int i, const Picture &current, Point centre, const Warp &warp);
+
+// As fit(), without the pixels that are blind in either picture; they are taken out of `pixels`. Saturated: too little
+// is left.
+Fit fit_seen(Pixels &pixels, const Picture &current, Point centre, const Warp &guess, const Settings &settings,
+             Bench &bench, const Prior *prior = nullptr);
 
 // e = reference − (current − offset)/gain at a warp that is not changed; Σ e², or a negative number outside.
 double misfit(const Pixels &pixels, const Picture &current, Point centre, const Warp &warp, double gain, double offset,
