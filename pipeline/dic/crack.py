@@ -11,6 +11,8 @@ from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.dic.jumps import Raster, jumps
 from pipeline.dic.ridge import ridge
 
+_STRAY = 5.0  # points farther from their plane than so many medians do not count
+
 
 @dataclass(frozen=True, eq=False)
 class Crack:
@@ -130,14 +132,26 @@ def _two_planes(arm: np.ndarray, value: np.ndarray, normal: np.ndarray, blind: f
     basis = np.column_stack([np.ones(use.sum()), arm[use], 0.5 * side, arm[use] * side[:, None]])
     if min((side > 0).sum(), (side < 0).sum()) < 6 or np.linalg.matrix_rank(basis) < 6:
         return np.full(2, np.nan), np.nan, True
-    solution, *_ = np.linalg.lstsq(basis, value[use], rcond=None)
-    left = value[use] - basis @ solution
-    variance = np.sum(left**2) / (2 * max(len(left) - 6, 1))
+    left = value[use] - basis @ np.linalg.lstsq(basis, value[use], rcond=None)[0]
     x, y = (arm[use] / np.abs(arm).max()).T
     smooth = np.column_stack([x**i * y**j for i in range(4) for j in range(4 - i)])
     bent = value[use] - smooth @ np.linalg.lstsq(smooth, value[use], rcond=None)[0]
     torn = np.sum(left**2) / (len(left) - 6) < np.sum(bent**2) / max(len(left) - 10, 1)
-    return solution[3], float(np.sqrt(variance * np.linalg.inv(basis.T @ basis)[3, 3])), bool(torn)
+    step, std = _without_strays(basis, value[use], left)
+    return step, std, bool(torn)
+
+
+def _without_strays(basis: np.ndarray, value: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, float]:
+    """Step and standard deviation again, without points far from their plane: those beside a winding crack that lie
+    on the other flank than the path says."""
+    size = np.linalg.norm(left, axis=1)
+    keep = size <= _STRAY * np.median(size)
+    if np.linalg.matrix_rank(basis[keep]) < 6:
+        keep = np.ones(len(left), bool)
+    basis, value = basis[keep], value[keep]
+    solution, *_ = np.linalg.lstsq(basis, value, rcond=None)
+    variance = np.sum((value - basis @ solution) ** 2) / (2 * max(len(value) - 6, 1))
+    return solution[3], float(np.sqrt(variance * np.linalg.inv(basis.T @ basis)[3, 3]))
 
 
 def _tip(arc: np.ndarray, size: np.ndarray, std: np.ndarray, blind: float, reach: float) -> tuple[float, float]:

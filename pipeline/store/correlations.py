@@ -6,9 +6,11 @@ import contextlib
 import hashlib
 import logging
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from pipeline.core.errors import MissingFileError, StoreError
 from pipeline.dic.correlation import Correlation
@@ -120,6 +122,12 @@ class FrameStore:
                 return str(file.attrs.get("key"))
         except OSError:  # also MissingFileError and StoreError
             return None
+
+
+def as_kept(result: Correlation) -> Correlation:
+    """A result as it comes back from its file: real numbers in single precision, 6e-8 relative."""
+    names = ("warp", "znssd", "std", "level", "line", "far", "jump", "jump_std")
+    return replace(result, **{name: getattr(result, name).astype(np.float32).astype(float) for name in names})
 
 
 def _values(key: str, frame: Frame) -> dict[str, Any]:

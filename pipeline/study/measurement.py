@@ -25,7 +25,7 @@ from pipeline.dic.settings import Settings
 from pipeline.dic.track import Tracker
 from pipeline.execution.progress import Progress
 from pipeline.store.bundle import Bundle
-from pipeline.store.correlations import Frame, FrameStore, chained_keys
+from pipeline.store.correlations import Frame, FrameStore, as_kept, chained_keys
 from pipeline.store.fields import stream_fields
 from pipeline.store.images import read_grey
 from pipeline.store.results import prepare_output
@@ -33,7 +33,8 @@ from pipeline.study.gauge import Timing, notch_opening, synchronised
 from pipeline.study.photography import view_of
 
 FRAMES = "frames"
-RESTING = 1.5  # a frame is at rest while its points scatter at most this many times as the correlation expects
+SHAKY = 3.0  # a first frame whose points scatter more than so many times as expected is not at rest
+GROWTH = 1.1  # … and the others are while their scatter is not so many times that of the calmest before them
 AT_REST = 2  # frames at rest that make the noise known
 
 
@@ -158,7 +159,8 @@ def _followed(tracker: Tracker, image: Path, mouth: np.ndarray) -> Frame:
     began = time.perf_counter()
     picture = _picture(image)
     with _named(image):
-        result = tracker.follow(picture)
+        result = as_kept(tracker.follow(picture))
+    tracker.keep(result)
     seconds = time.perf_counter() - began
     return Frame(tracker.number, result, crack_of(result, mouth), tracker.base, tracker.sound, seconds)
 
@@ -240,8 +242,7 @@ def measure(bundle: Bundle, series: Series) -> Measurement:
         seconds += frame.seconds
         if frame.crack is not None:
             tip[k], tip_std[k] = frame.crack.tip, frame.crack.tip_std
-    moving = np.flatnonzero(scatter[1:] > RESTING * predicted[1:])
-    resting = int(moving[0]) if moving.size else count - 1
+    resting = frames_at_rest(scatter[1:] / predicted[1:])
     factor = 1.0
     if resting >= AT_REST:
         still = slice(1, resting + 1)
@@ -249,6 +250,15 @@ def measure(bundle: Bundle, series: Series) -> Measurement:
     timing = synchronised(bundle, series.stamp, notch_opening(bundle.specimen, series, factor))
     noise = factor * float(np.median(usual[1:]))
     return Measurement(series, timing, factor, resting, noise, valid, split, tip, tip_std, seconds)
+
+
+def frames_at_rest(ratio: np.ndarray) -> int:
+    """How many frames after the reference are at rest, from scatter over expected scatter (frames,)."""
+    if not ratio.size or ratio[0] > SHAKY:
+        return 0
+    calmest = np.minimum.accumulate(ratio)
+    moving = np.flatnonzero(ratio[1:] > GROWTH * calmest[:-1])
+    return 1 + int(moving[0]) if moving.size else int(ratio.size)
 
 
 def rest_scatter(result: Correlation) -> tuple[float, float]:
