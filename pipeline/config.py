@@ -68,6 +68,10 @@ class RunSettings(BaseModel):
         default=3, description="how often the grid may be moved when the optimum lies on its edge"
     )
     recentring_steps: Annotated[int, Field(ge=1, le=10)] = Field(default=2, description="grid lines by which it moves")
+    refinement_count: Annotated[int, Field(ge=0, le=4)] = Field(
+        default=1,
+        description="how often the grid may be halved around an optimum that it does not resolve",
+    )
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,
         description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",

@@ -12,6 +12,7 @@ from pipeline.inverse.discrepancy import Discrepancy
 from pipeline.inverse.newton import Minimum, minimise
 from pipeline.inverse.objective import Comparison, Objective, Rigid, compare, differences, left_out
 from pipeline.inverse.observations import Measured, Simulated
+from pipeline.inverse.resolution import data_minimum, resolves
 from pipeline.inverse.surrogate import LagrangeSurrogate, leave_one_out
 from pipeline.inverse.uncertainty import Fit, Uncertainty, curvature_certainty, uncertainty
 
@@ -55,6 +56,7 @@ class Estimate:
     surrogate : LagrangeSurrogate of Φ
     loo_error : float; rms leave-one-out error of the surrogate, unit of Φ
     data_objective : float; Φ at the optimum from the interpolated data instead of the interpolated Φ
+    data_position : (2,) array, N and m; where that Φ has its own minimum
     minimum : Minimum of the surrogate
     others : tuple of Minimum; further local minima inside the grid that are no worse by more than loo_error
     refused : str; why the optimum is not accepted, empty where it is
@@ -72,6 +74,7 @@ class Estimate:
     surrogate: LagrangeSurrogate
     loo_error: float
     data_objective: float
+    data_position: np.ndarray
     minimum: Minimum
     others: tuple[Minimum, ...]
     refused: str
@@ -105,6 +108,11 @@ class Estimate:
     def accepted(self) -> bool:
         """Whether the optimum passed every check, so that it has intervals."""
         return not self.refused
+
+    @property
+    def resolved(self) -> bool:
+        """Whether a finer grid would leave the optimum where it is, within its interval."""
+        return resolves(self.minimum.position, self.data_position, self.uncertainty)
 
     @property
     def status(self) -> str:
@@ -161,6 +169,7 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
         surrogate=surrogate,
         loo_error=loo_error,
         data_objective=data_objective,
+        data_position=data_minimum(fit),
         minimum=best,
         others=tuple(m for m in others if m.converged and m.interior and m.value <= best.value + loo_error),
         refused=refused,

@@ -185,11 +185,25 @@ def from_images(model: Model, aim: Objective, folder: Path, settings: RunSetting
 
 
 def search(campaign: Campaign, aim: Objective) -> Estimate:
-    """Estimate on the grid; where the optimum lies on its edge, move the grid and estimate again."""
+    """Estimate on the grid; halve it around an optimum that it does not resolve, and estimate again."""
     settings = campaign.settings
-    centre = start_parameters(campaign.model.bundle)
-    design = Design(centre, settings.f_factors, settings.delta_factors)
-    campaign.progress.stage(f"{np.prod(design.shape)} simulations")
+    start = Design(start_parameters(campaign.model.bundle), settings.f_factors, settings.delta_factors)
+    campaign.progress.stage(f"{np.prod(start.shape)} simulations")
+    found = centred(campaign, start, aim)
+    for halving in range(settings.refinement_count):
+        if found.resolved or not found.interior:
+            break
+        campaign.progress.stage(f"grid halved around the optimum, {halving + 1} of at most {settings.refinement_count}")
+        finer = centred(campaign, found.design.refined(*found.data_position), aim)
+        if found.accepted and not finer.accepted:
+            break
+        found = finer
+    return found
+
+
+def centred(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
+    """Estimate on a grid; where the optimum lies on its edge, move the grid and estimate again."""
+    settings = campaign.settings
     found = estimate_on(campaign, design, aim)
     for move in range(settings.recentring_count):
         moved = design.recentred(found.f_max, found.delta_max, settings.recentring_steps)
