@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
+from pipeline.cli_library import library
 from pipeline.core.errors import UnavailableError
 from pipeline.options import (
     Accuracy,
@@ -47,9 +48,10 @@ from pipeline.options import (
     Workers,
     option,
 )
-from pipeline.terminal import Display, exit_codes
+from pipeline.terminal import Display, exit_codes, finish
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.add_typer(library, name="library")
 
 
 @app.callback()
@@ -70,13 +72,6 @@ def refuse_until_built(**options: object) -> None:
     given = ["--" + name.replace("_", "-") for name, value in options.items() if value]
     if given:
         raise UnavailableError(f"not available in version {__version__}: {', '.join(given)}; leave it out")
-
-
-def finish(summary: str | None, place: Path) -> None:
-    """Print what a command found and where the result lies."""
-    if summary:
-        print(summary)
-    print(f"result: {place}", flush=True)
 
 
 @app.command()

@@ -124,6 +124,14 @@ def time_span(text: str) -> tuple[float, float]:
     return parts[0], parts[1]
 
 
+def temperature_range(text: str) -> tuple[float, float]:
+    """Two temperatures in °C that do not fall, separated by a comma."""
+    parts = [celsius(part) for part in text.split(",")]
+    if len(parts) != 2 or parts[0] > parts[1]:
+        raise typer.BadParameter(f"{text!r} must be two temperatures in °C, the colder one first, as in -20,-10")
+    return parts[0], parts[1]
+
+
 def named_number(text: str) -> tuple[str, float]:
     """NAME=VALUE."""
     name, equals, value = text.partition("=")
@@ -224,6 +232,10 @@ LoadNoise = Annotated[float, option("--load-noise-n", metavar="S", parser=load_n
 Temperature = Annotated[
     float | None,
     option("--temperature-c", metavar="T", parser=celsius, help="Temperature of the fracture test, in °C."),
+]
+TemperatureRange = Annotated[
+    Any,
+    option("--temperatures-c", metavar="A,B", parser=temperature_range, help="Entries between these, in °C, only."),
 ]
 Times = Annotated[
     Any,

@@ -10,6 +10,7 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from types import TracebackType
 
 import typer
@@ -48,6 +49,13 @@ def exit_codes(debug: bool) -> Iterator[None]:
     except Exception as error:
         told = f"{type(error).__name__}: {error}; this is a fault of the program: please report it with --debug"
         _end(error, told, 1, debug)
+
+
+def finish(summary: str | None, place: Path) -> None:
+    """Print what a command found and where the result lies."""
+    if summary:
+        print(summary)
+    print(f"result: {place}", flush=True)
 
 
 def _end(error: BaseException, message: str, code: int, debug: bool) -> None:

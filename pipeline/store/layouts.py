@@ -187,3 +187,35 @@ LEVELLED = Layout(
 )
 
 _ROW = ("entries",)
+LIBRARY = Layout(
+    "library",
+    (
+        Entry("key", _ROW, "1", "name of the entry, made from what was identified", "str"),
+        Entry("mixture", _ROW, "1", "what was tested", "str"),
+        Entry("bundle", _ROW, "1", "name of the test", "str"),
+        Entry("geometry", _ROW, "1", "seb or dct", "str"),
+        Entry("temperature_c", _ROW, "°C", "of the test; NaN where not stated"),
+        Entry("thickness_mm", _ROW, "mm", "of the specimen"),
+        Entry("bond_area_mm2", _ROW, "mm²", "2 r t of the bundle's lattice"),
+        Entry("cmod_rate_mm_per_min", _ROW, "mm/min", "of the test"),
+        Entry("f_max_n", _ROW, "N", "strength of a bond of that lattice"),
+        Entry("delta_max_m", _ROW, "m", "critical opening"),
+        Entry("f_max_95_n", (*_ROW, 2), "N", "95 % interval; NaN where there is none, also below"),
+        Entry("delta_max_95_m", (*_ROW, 2), "m", "95 % interval"),
+        Entry("variance_f_max", _ROW, "N²", "of the estimate"),
+        Entry("covariance", _ROW, "N m", "of f_max and delta_max"),
+        Entry("variance_delta_max", _ROW, "m²", "of the estimate"),
+        Entry("energy_j_per_m2", _ROW, "J/m²", "f_max delta_max/(2 r t)"),
+        Entry("energy_95_j_per_m2", (*_ROW, 2), "J/m²", "95 % interval"),
+        Entry("peak_load_n", _ROW, "N", "of the simulation at the optimum"),
+        Entry("cmod_at_peak_mm", _ROW, "mm", "likewise"),
+        Entry("peak_load_mismatch", _ROW, "1", "simulated over measured peak load, minus one"),
+        Entry("engine", _ROW, "1", "what simulated", "str"),
+        Entry("objective", _ROW, "1", "what was compared", "str"),
+        Entry("version", _ROW, "1", "of the program that identified", "str"),
+        Entry("accepted", _ROW, "1", "whether the fit passed its own checks", "bool"),
+        Entry("source", _ROW, "1", "folder of the result when it was added", "str"),
+        Entry("added", _ROW, "1", "when, UTC", "str"),
+        Entry("note", _ROW, "1", "a remark", "str"),
+    ),
+)

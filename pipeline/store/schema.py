@@ -25,7 +25,7 @@ class Entry:
     name : str; path of the dataset, or name of the attribute of the root
     shape : names of dimensions or fixed sizes; () is a scalar, None an attribute
     unit, meaning : str; for the documentation
-    dtype : str; NumPy's name, or "str" for a text attribute
+    dtype : str; NumPy's name, or "str" for text
     also : other shapes that are accepted
     optional : bool
     """
@@ -159,7 +159,7 @@ def _put(file: h5py.File, entry: Entry, value: Any) -> None:
     if entry.shape is None:
         file.attrs[entry.name] = str(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
         return
-    array = np.asarray(value, entry.dtype)
+    array = _encoded(value) if entry.dtype == "str" else np.asarray(value, entry.dtype)
     packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size else {}
     dataset = file.create_dataset(entry.name, data=array, **(packed if array.ndim else {}))
     dataset.attrs["unit"] = entry.unit
@@ -171,14 +171,23 @@ def _get(file: h5py.File, entry: Entry) -> Any:
         return value if value is None or entry.dtype == "str" else np.dtype(entry.dtype).type(value).item()
     if entry.name not in file:
         return None
+    if entry.dtype == "str":
+        return np.asarray(file[entry.name].asstr()[()], object)
     return np.asarray(file[entry.name][()], entry.dtype)
+
+
+def _encoded(value: Any) -> np.ndarray:
+    """Texts as UTF-8 of one length, which is packed and checked as numbers are."""
+    texts = [str(text).encode() for text in np.ravel(np.asarray(value, object))]
+    length = max(map(len, texts), default=1) or 1
+    return np.array(texts, h5py.string_dtype("utf-8", length)).reshape(np.shape(value))
 
 
 def _misfit(entry: Entry, item: Any, sizes: dict[str, tuple[int, str]]) -> list[str]:
     """What is wrong with kind and shape of one dataset; `sizes` remembers each dimension and who set it."""
     if not isinstance(item, h5py.Dataset):
         return [f"{entry.name} must be a dataset"]
-    if item.dtype.kind not in ("biu" if entry.dtype == "bool" else "biuf"):
+    if item.dtype.kind not in {"bool": "biu", "str": "SO"}.get(entry.dtype, "biuf"):
         return [f"{entry.name} holds {item.dtype}, it must hold {entry.dtype}"]
     reasons = [_mismatch(shape, item.shape, sizes) for shape in entry.shapes]
     if "" not in reasons:

@@ -150,3 +150,23 @@ def test_every_layout_names_each_entry_once_with_a_unit_that_fits_its_name(layou
         last = entry.name.rsplit("_", 1)[-1]
         if last in ("m", "n", "s", "j", "mm"):
             assert entry.unit == {"m": "m", "n": "N", "s": "s", "j": "J", "mm": "mm"}[last], entry.name
+
+
+TEXTS = Layout("texts", (Entry("name", ("n",), "1", "names", "str"), Entry("x", ("n",), "m", "numbers")))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12), max_size=6))
+def test_rows_of_text_are_kept(tmp_path_factory, texts):
+    path = tmp_path_factory.mktemp("h5") / "x.h5"
+    path.write_bytes(TEXTS.encode({"name": texts, "x": np.zeros(len(texts))}))
+    assert TEXTS.decode(path)["name"].tolist() == texts
+
+
+def test_text_where_numbers_belong_and_the_other_way_are_refused(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file.attrs["format"] = 1
+        file["name"], file["x"] = np.zeros(2), np.array([b"a", b"b"])
+    with pytest.raises(StoreError, match="name holds float64, it must hold str") as error:
+        TEXTS.decode(tmp_path / "x.h5")
+    assert "it must hold float64" in str(error.value)
