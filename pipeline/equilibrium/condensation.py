@@ -1,8 +1,8 @@
 """Static condensation: what stays elastic becomes a stiffness between the variables around the crack.
 
-Bonds are *active*, followed through the law, or *far*, elastic with K^n. Variables that move an active bond
-or the gauge are kept; the others are eliminated exactly (Schur complement; Guyan 1965). After every
-increment the far bonds are looked at: one that would have been damaged becomes active.
+Bonds are *active*, followed through the law, or *far*, elastic with K^n. Variables that move a bond of the strip
+or the gauge are kept; the others are eliminated exactly (Schur complement; Guyan 1965). After every increment
+the far bonds are looked at: one that would have been damaged becomes active, as an island or in a wider strip.
 """
 
 from __future__ import annotations
@@ -13,49 +13,72 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
 from pipeline.equilibrium.potential import factorise
 from pipeline.materials.cohesive import LinearSoftening
 
+BATCH = 64  # right-hand sides at a time
+
 
 @dataclass(frozen=True)
 class CondensedNetwork:
-    """Active bonds on an elastic support.
+    """Active bonds on an elastic support; the variables are those kept, then one for each island.
 
     Parameters
     ----------
-    bonds : SmallNetwork of the active bonds in the kept variables
+    bonds : SmallNetwork of the strip's bonds in the kept variables
     edge : (b,) int array; kept variables that the support acts on
     support : (b + 1, b + 1) array, N/m, over these and the machine displacement
-    spread : (q, q) sparse array, N/m; the same over all kept variables, without the machine
+    islands : Islands
     """
 
     bonds: SmallNetwork
     edge: np.ndarray
     support: np.ndarray
-    spread: sparse.csc_array
+    islands: Islands
+
+    @property
+    def kept(self) -> int:
+        return self.bonds.jacobian.shape[1]
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
-        return self.bonds.opening(free, machine)
+        apart = self.islands.opening(self._moved(free, machine), free[self.kept :])
+        return np.append(self.bonds.opening(free[: self.kept], machine), apart)
 
     def pull(self, force: np.ndarray, free: np.ndarray, machine: float) -> tuple[np.ndarray, float]:
-        internal, load = self.bonds.pull(force, free, machine)
-        carried = self.support @ np.append(free[self.edge], machine)
+        strip, moved = self.bonds.drive.size, self._moved(free, machine)
+        internal, load = self.bonds.pull(force[:strip], free[: self.kept], machine)
+        carried, own = self.islands.pull(force[strip:], moved, free[self.kept :])
+        carried += self.support @ moved
         internal[self.edge] += carried[:-1]
-        return internal, load + float(carried[-1])
+        return np.append(internal, own), load + float(carried[-1])
 
     def stiffness(self, weight: np.ndarray, free: np.ndarray, machine: float) -> sparse.csc_array:
-        return (self.bonds.stiffness(weight, free, machine) + self.spread).tocsc()
+        """Without the coupling of strip and islands, which is weak: still positive definite."""
+        strip, islands = self.bonds.drive.size, self.islands
+        soft = weight[strip:] - islands.k_n
+        row = islands.row[:, :-1]
+        inner = self.bonds.stiffness(weight[:strip], free[: self.kept], machine)
+        inner = inner + _spread(self.support[:-1, :-1] + row.T @ (soft[:, None] * row), self.edge, self.kept)
+        if not islands.count:
+            return inner.tocsc()
+        apart = sparse.csc_array(islands.inverse + np.diag(soft))
+        return sparse.block_diag([inner, apart], format="csc")
 
     def energy(self, free: np.ndarray, machine: float) -> float:
-        moved = np.append(free[self.edge], machine)
-        return 0.5 * float(moved @ self.support @ moved)
+        moved = self._moved(free, machine)
+        return 0.5 * float(moved @ self.support @ moved) + self.islands.energy(moved, free[self.kept :])
+
+    def _moved(self, free: np.ndarray, machine: float) -> np.ndarray:
+        """Edge and machine (b + 1,), m."""
+        return np.append(free[self.edge], machine)
 
 
 @dataclass(frozen=True)
 class FarField:
-    """The eliminated variables: K_ff q_f + K_fk q_k + K_fs s = 0.
+    """The eliminated variables: K_ff q_f + K_fk q_k + K_fs s = J_ofᵀ q.
 
     Parameters
     ----------
@@ -69,9 +92,10 @@ class FarField:
     coupling: sparse.csr_array
     drive: np.ndarray
 
-    def follow(self, kept: np.ndarray, machine: float) -> np.ndarray:
+    def follow(self, kept: np.ndarray, machine: float, islands: Islands, extra: np.ndarray) -> np.ndarray:
         """Eliminated variables (f,), m."""
-        return -self.factor.solve(self.coupling @ kept + machine * self.drive)
+        pushed = islands.jacobian.T @ islands.tension_lost(extra)
+        return self.factor.solve(pushed - self.coupling @ kept - machine * self.drive)
 
 
 @dataclass(frozen=True)
@@ -81,14 +105,14 @@ class CondensedModel:
     Parameters
     ----------
     whole : WholeModel
-    active : (m,) bool array over all bonds
+    strip : (m,) bool array over all bonds; those followed in the kept variables
     kept : (q,) int array; kept variables, numbered in the whole model
     network : CondensedNetwork; law, gauge and gauge_drive : as in `model.Model`
     far : FarField
     """
 
     whole: WholeModel
-    active: np.ndarray
+    strip: np.ndarray
     kept: np.ndarray
     network: CondensedNetwork
     law: LinearSoftening
@@ -96,25 +120,39 @@ class CondensedModel:
     gauge_drive: float
     far: FarField
 
+    @property
+    def bonds(self) -> np.ndarray:
+        """Numbers of the active bonds in the whole model, in the order of this one."""
+        return np.append(np.flatnonzero(self.strip), self.network.islands.index)
+
+    @property
+    def active(self) -> np.ndarray:
+        """Which bonds (m,) bool are followed through the law."""
+        chosen = self.strip.copy()
+        chosen[self.network.islands.index] = True
+        return chosen
+
     def complete(self, free: np.ndarray, machine: float) -> np.ndarray:
         """Variables of the whole model (all,), m."""
+        kept, extra = free[: self.kept.size], free[self.kept.size :]
         every = np.zeros(self.whole.gauge.size)
-        every[self.kept] = free
-        every[self.far.inner] = self.far.follow(free, machine)
+        every[self.kept] = kept
+        every[self.far.inner] = self.far.follow(kept, machine, self.network.islands, extra)
         return every
 
     def reduce(self, state: State) -> State:
         """A state of the whole model in the variables of this one."""
-        return replace(
-            state, free=state.free[self.kept], opening=state.opening[self.active], reached=state.reached[self.active]
-        )
+        kept, bonds, islands = state.free[self.kept], self.bonds, self.network.islands
+        moved = np.append(kept[self.network.edge], state.machine)
+        extra = state.opening[islands.index] - islands.opening(moved, np.zeros(islands.count))
+        return replace(state, free=np.append(kept, extra), opening=state.opening[bonds], reached=state.reached[bonds])
 
     def expand(self, state: State) -> State:
         """A state of this model in the variables of the whole one; far bonds never opened farther than now."""
         free = self.complete(state.free, state.machine)
         opening = self.whole.network.opening(free, state.machine)
         reached = np.maximum(opening, 0.0)
-        reached[self.active] = state.reached
+        reached[self.bonds] = state.reached
         return replace(state, free=free, opening=opening, reached=reached)
 
     def weak(self, state: State, share: float) -> np.ndarray:
@@ -122,12 +160,27 @@ class CondensedModel:
         opening = self.whole.network.opening(self.complete(state.free, state.machine), state.machine)
         return ~self.active & (opening > share * self.whole.law.delta_peak)
 
+    def grown(self, more: np.ndarray) -> CondensedModel:
+        """The model with further bonds (m,) bool as islands, by one solution of the far field each."""
+        index = np.flatnonzero(more & ~self.active)
+        if not index.size:
+            return self
+        (whole, law), far, edge = _divisible(self.whole), self.far, self.network.edge
+        jacobian = whole.jacobian[index].tocsr()
+        inner = jacobian[:, far.inner].tocsr()
+        columns = _solutions(far.factor, inner.T.tocsc())
+        across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsr()
+        direct = np.column_stack([jacobian[:, self.kept[edge]].toarray(), whole.drive[index]])
+        row = direct - (across.T @ columns).T
+        islands = joined(self.network.islands, index, row, columns, inner, law.k_n[index])
+        law = law.of(np.append(np.flatnonzero(self.strip), islands.index))
+        gauge = np.append(self.whole.gauge[self.kept], np.zeros(islands.count))
+        return replace(self, network=replace(self.network, islands=islands), law=law, gauge=gauge)
+
 
 def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
-    """Reduce a model with small kinematics to the variables of its active bonds (m,) bool."""
-    network, law = whole.network, whole.law
-    if not isinstance(network, SmallNetwork) or not isinstance(law, LinearSoftening):
-        raise TypeError("only linear kinematics and a law that can be divided are condensed")
+    """Reduce a model with small kinematics to the variables of its active bonds (m,) bool, the strip."""
+    network, law = _divisible(whole)
     kept, inner = _divide(network, active, whole.gauge)
     rigid = network.part(~active, np.arange(whole.gauge.size))
     stiffness = rigid.stiffness(law.k_n[~active], whole.gauge, 0.0).tocsr()
@@ -141,9 +194,9 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     support = schur_complement(inside, across, outer, far.factor)
     return CondensedModel(
         whole=whole,
-        active=active,
+        strip=active,
         kept=kept,
-        network=CondensedNetwork(network.part(active, kept), edge, support, _spread(support, edge, kept.size)),
+        network=CondensedNetwork(network.part(active, kept), edge, support, no_islands(edge.size, inner.size)),
         law=law.of(active),
         gauge=whole.gauge[kept],
         gauge_drive=whole.gauge_drive,
@@ -151,11 +204,25 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     )
 
 
+def _divisible(whole: WholeModel) -> tuple[SmallNetwork, LinearSoftening]:
+    """Network and law of a model that can be condensed."""
+    network, law = whole.network, whole.law
+    if not isinstance(network, SmallNetwork) or not isinstance(law, LinearSoftening):
+        raise TypeError("only linear kinematics and a law that can be divided are condensed")
+    return network, law
+
+
 def _divide(network: SmallNetwork, active: np.ndarray, gauge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Variables to keep and to eliminate: those that move an active bond or the gauge, and the others."""
     needed = gauge != 0
     needed[network.jacobian[active].indices] = True
     return np.flatnonzero(needed), np.flatnonzero(~needed)
+
+
+def _solutions(factor: SuperLU, right: sparse.csc_array) -> np.ndarray:
+    """K⁻¹ B (f, k) of sparse right-hand sides, some at a time."""
+    parts = [factor.solve(right[:, k : k + BATCH].toarray()) for k in range(0, right.shape[1], BATCH)]
+    return np.hstack(parts)
 
 
 def schur_complement(
@@ -182,6 +249,6 @@ def schur_complement(
 
 
 def _spread(support: np.ndarray, edge: np.ndarray, size: int) -> sparse.csc_array:
-    """The support among the kept variables as a sparse array (size, size)."""
+    """A stiffness (b, b) of the edge among the kept variables, as a sparse array (size, size)."""
     row, column = np.repeat(edge, edge.size), np.tile(edge, edge.size)
-    return sparse.coo_array((support[:-1, :-1].ravel(), (row, column)), shape=(size, size)).tocsc()
+    return sparse.coo_array((support.ravel(), (row, column)), shape=(size, size)).tocsc()

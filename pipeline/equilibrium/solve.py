@@ -83,13 +83,13 @@ class _Journey:
             self.record.add(state, before, self.fields)
         chosen = active.strip(problem)
         if condensed and active.pays(problem, chosen):
-            self._adopt(chosen)
+            self._adopt(condense(self.whole, chosen))
 
     def step(self) -> None:
         """One increment; repeated with a larger model where a bond outside it would have been damaged."""
         found = self.path.next(self.before, self.state)
         if isinstance(self.model, CondensedModel) and self.model.weak(found, 1.0).any():
-            self._adopt(self.model.active | self.model.weak(found, active.LIKELY))
+            self._adopt(self.model.grown(self.model.weak(found, active.LIKELY)))
             return
         self.record.add(found, self.state, self.fields)
         self.before, self.state = self.state, found
@@ -112,12 +112,11 @@ class _Journey:
     def _expanded(self, state: State) -> State:
         return state if isinstance(self.model, WholeModel) else self.model.expand(state)
 
-    def _adopt(self, chosen: np.ndarray) -> None:
-        """Go on with the bonds (m,) bool active, all others condensed."""
-        larger = condense(self.whole, chosen)
-        self.before, self.state = (larger.reduce(self._expanded(s)) for s in (self.before, self.state))
-        self.model = larger
-        self.path.stepper = self.path.stepper.on(larger)
+    def _adopt(self, model: CondensedModel) -> None:
+        """Go on with another model of the same specimen."""
+        self.before, self.state = (model.reduce(self._expanded(s)) for s in (self.before, self.state))
+        self.model = model
+        self.path.stepper = self.path.stepper.on(model)
 
 
 def _refuse(problem: Problem, tolerance: float) -> None:
