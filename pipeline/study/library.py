@@ -145,12 +145,13 @@ def start(library: Path, bundle: Path, wanted: Filter) -> str:
     chosen = nearest(entries, test)
     area = 2 * test.model.radius * test.specimen.thickness / MM**2
     f_max, delta_max = chosen.traction_mpa * area, chosen.delta_max_m
+    at = [] if math.isnan(chosen.temperature_c) else [f"{chosen.temperature_c:g} °C"]
     path = Path(bundle) / FILE
     write_atomically(path, with_start(path.read_text("utf-8-sig"), f_max, delta_max, chosen).encode())
     read_bundle(bundle)  # what was written is read as everything else is
     return (
         f"[start] of {test.name}: f_max_n = {f_max:.4g}, delta_max_m = {delta_max:.4g}, from {chosen.key} "
-        f"({chosen.bundle}, {chosen.geometry}, {chosen.temperature_c:g} °C)"
+        f"({', '.join([chosen.bundle, chosen.geometry, *at])})"
     )
 
 
@@ -182,7 +183,21 @@ def with_start(text: str, f_max: float, delta_max: float, source: LibraryEntry) 
     return text[: table.start(1)] + body + text[table.end(1) :]
 
 
-HEADER = ["key", "mixture", "test", "geometry", "°C", "f_max (N)", "95 %", "delta_max (mm)", "95 %", "MPa", "J/m²", ""]
+HEADER = [
+    "key",
+    "mixture",
+    "test",
+    "geometry",
+    "°C",
+    "f_max (N)",
+    "95 %",
+    "delta_max (mm)",
+    "95 %",
+    "MPa",
+    "J/m²",
+    "load",
+    "",
+]
 
 
 def _row(entry: LibraryEntry) -> list[str]:
@@ -200,6 +215,7 @@ def _row(entry: LibraryEntry) -> list[str]:
         "" if math.isnan(least) else f"{least / MM:.4g}–{most / MM:.4g}",
         f"{entry.traction_mpa:.3g}",
         f"{entry.energy_j_per_m2:.0f}",
+        "" if math.isnan(entry.peak_load_mismatch) else f"{entry.peak_load_mismatch:+.0%}",
         entry.note if entry.accepted else f"not accepted {entry.note}".strip(),
     ]
 
