@@ -57,6 +57,7 @@ class Estimate:
     loo_error : float; rms leave-one-out error of the surrogate, unit of Φ
     data_objective : float; Φ at the optimum from the interpolated data instead of the interpolated Φ
     data_position : (2,) array, N and m; where that Φ has its own minimum
+    resolved : bool; the optimum is accepted, and a finer grid would leave it where it is beside noise and discrepancy
     minimum : Minimum of the surrogate
     others : tuple of Minimum; further local minima inside the grid that are no worse by more than loo_error
     refused : str; why the optimum is not accepted, empty where it is
@@ -75,6 +76,7 @@ class Estimate:
     loo_error: float
     data_objective: float
     data_position: np.ndarray
+    resolved: bool
     minimum: Minimum
     others: tuple[Minimum, ...]
     refused: str
@@ -108,11 +110,6 @@ class Estimate:
     def accepted(self) -> bool:
         """Whether the optimum passed every check, so that it has intervals."""
         return not self.refused
-
-    @property
-    def resolved(self) -> bool:
-        """Whether a finer grid would leave the optimum where it is, within its interval."""
-        return resolves(self.minimum.position, self.data_position, self.uncertainty)
 
     @property
     def status(self) -> str:
@@ -160,6 +157,7 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     displacement, load = (_interpolated(design, a) for a in (simulated.displacement, simulated.load))
     fit = Fit(comparison, surrogate, LagrangeSurrogate(design.f_max, design.delta_max, features), load, best)
     data_objective = float(np.sum(fit.residual**2))
+    data_position = data_minimum(fit)
     refused = refusal(best, float(objective.min()), data_objective, loo_error)
     return Estimate(
         design=design,
@@ -169,7 +167,8 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
         surrogate=surrogate,
         loo_error=loo_error,
         data_objective=data_objective,
-        data_position=data_minimum(fit),
+        data_position=data_position,
+        resolved=not refused and resolves(fit, data_position, settings.discrepancy),
         minimum=best,
         others=tuple(m for m in others if m.converged and m.interior and m.value <= best.value + loo_error),
         refused=refused,

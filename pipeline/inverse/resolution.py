@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.inverse.uncertainty import Fit, Uncertainty
+from pipeline.inverse.discrepancy import Discrepancy
+from pipeline.inverse.newton import Minimum
+from pipeline.inverse.uncertainty import Fit, uncertainty
 
-SHARE = 0.5  # of the standard deviation by which the two minima may differ
-CURABLE = ("scatter", "modulus")  # what a finer grid may cure, and what moves both minima alike
+SHARE = 0.3  # of a standard deviation by which the two minima may differ: a tenth more variance
 LEAST = 1e-3  # of the parameters themselves; finer than this nothing is asked for
 
 
@@ -29,13 +32,24 @@ def data_minimum(fit: Fit) -> np.ndarray:
     return low + size * found.x
 
 
-def resolves(position: np.ndarray, data_position: np.ndarray, doubt: Uncertainty | None) -> bool:
-    """Whether the two minima, (2,) each, are as one beside what noise and discrepancy leave open.
+def resolves(fit: Fit, data_position: np.ndarray, discrepancy: Discrepancy) -> bool:
+    """Whether the two minima are as one beside what noise and discrepancy leave open.
 
-    Never where there is no interval.
+    Both are judged at the minimum of the interpolated data, where the residual holds no error of the multinomial. What
+    moves both minima alike, the modulus, does not count.
+
+    Parameters
+    ----------
+    fit : Fit
+    data_position : (2,) array, N and m; from `data_minimum`
+    discrepancy : Discrepancy
     """
-    if doubt is None:
-        return False
-    kept = [c.covariance for c in doubt.budget if c.name not in CURABLE]
-    std = np.sqrt(np.diag(np.sum(kept, axis=0)))
-    return bool(np.all(np.abs(position - data_position) <= np.maximum(SHARE * std, LEAST * position)))
+    slopes = fit.features.gradient(data_position).T
+    there = Minimum(data_position, 0.0, 2 * slopes.T @ slopes, True, True, 0)  # the Hessian without its second part
+    if not there.convex:
+        return True  # data that cannot tell the two apart: no grid helps
+    doubt = uncertainty(replace(fit, minimum=there), discrepancy, 0.0)
+    parts = [part.covariance for part in doubt.budget if part.name != "scatter"]
+    std = np.sqrt(np.diag(np.sum(parts, axis=0)))
+    apart = np.abs(fit.minimum.position - data_position)
+    return bool(np.all(apart <= np.maximum(SHARE * std, LEAST * data_position)))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.inverse.design import Design
 from pipeline.inverse.estimate import Settings, estimate
 from pipeline.inverse.objective import Objective
-from pipeline.inverse.resolution import resolves
 
 from .hinge import CENTRE, measured, simulated
 
@@ -35,14 +36,16 @@ def test_halving_the_grid_brings_the_two_minima_together():
     assert apart[1] < apart[0] / 3  # 4 for small distances
 
 
-def test_an_interval_decides_what_is_resolved():
-    grid, noise = Design(CENTRE), np.random.default_rng(5)
-    found = estimate(grid, simulated(grid), measured(tuple(TRUTH), noise), Settings(Objective.BOTH, 0.0))
-    assert found.resolved  # five lines 10 % apart do for this smooth model
-    here, near = found.minimum.position, found.minimum.position * 1.0005
-    assert resolves(here, near, found.uncertainty)  # less than a thousandth apart
-    assert not resolves(here, here * 1.5, found.uncertainty)
-    assert not resolves(here, here, None)
+def test_noise_decides_what_is_resolved():
+    grid = Design(CENTRE, (0.8, 1.0, 1.2), (0.8, 1.0, 1.2))
+    data = measured(tuple(TRUTH), np.random.default_rng(5))
+    noisy = replace(data, load_std=100 * data.load_std)
+    quiet, loud = (estimate(grid, simulated(grid), m, Settings(Objective.LOAD, 0.0)) for m in (data, noisy))
+    assert np.abs(quiet.minimum.position / quiet.data_position - 1).max() > 0.01  # three lines are too few
+    assert not quiet.resolved
+    assert loud.resolved  # the same difference, lost in a hundred times the noise
+    five = Design(CENTRE)
+    assert estimate(five, simulated(five), data, Settings(Objective.LOAD, 0.0)).resolved
 
 
 def test_an_estimate_without_interval_is_not_resolved():
