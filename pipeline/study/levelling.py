@@ -49,13 +49,19 @@ class Leveller:
 
     def seen(self, problem: Problem, solution: Solution) -> np.ndarray:
         """Displacements (frames, p, 2) in m of the points in the frames of a solution; NaN where none was found."""
-        path = self.folder / f"{self._key(problem)}.h5"
+        path = self.path(problem)
         known = self._kept(path)
         if known is not None:
             return known
         found = self._levelled(problem, solution)
         write_atomically(path, LEVELLED.encode({"points_m": self.points, "displacement_m": found}))
         return found
+
+    def path(self, problem: Problem) -> Path:
+        """The file of a simulation, camera, correlation and points."""
+        told = repr((__version__, self.view, replace(self.settings, threads=1), self.points.tolist()))
+        key = hashlib.sha256((problem_key(problem, self.engine) + told).encode()).hexdigest()
+        return self.folder / f"{key}.h5"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         try:
@@ -70,10 +76,6 @@ class Leveller:
         camera = Levelling(shape, view, replace(self.settings, roi_px=None))
         field = camera.field_at(self.points, problem.particles.position, solution.displacement, solution.cmod, torn)
         return np.where(field.valid[..., None], field.displacement, np.nan)
-
-    def _key(self, problem: Problem) -> str:
-        told = repr((__version__, self.view, replace(self.settings, threads=1), self.points.tolist()))
-        return hashlib.sha256((problem_key(problem, self.engine) + told).encode()).hexdigest()
 
 
 def crop(view: View, points: np.ndarray, settings: Settings) -> tuple[View, tuple[int, int]]:
