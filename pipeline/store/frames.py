@@ -54,7 +54,7 @@ def image_problems(images: tuple[Path, ...], thorough: bool) -> list[str]:
         try:
             sizes[image.name] = image_size(image)
             if thorough:
-                read_grey(image)
+                problems += _blank(image.name, read_grey(image))
         except PipelineError as error:
             problems.append(f"{FOLDER}/{error}")
     first = next(iter(sizes.values()), None)
@@ -64,6 +64,12 @@ def image_problems(images: tuple[Path, ...], thorough: bool) -> list[str]:
         if first and (r, c) != first
     ]
     return shortened(problems, "images") + shortened(odd, "images")
+
+
+def _blank(name: str, grey: np.ndarray) -> list[str]:
+    if np.ptp(grey):
+        return []
+    return [f"{FOLDER}/{name}: is blank (every pixel has the grey value {grey.flat[0]:g}): leave it out, with its time"]
 
 
 def _order_problems(file: str, names: list[str], images: tuple[Path, ...]) -> list[str]:

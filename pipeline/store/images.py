@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.core.errors import InputError, MissingFileError
 from pipeline.store.atomic import write_atomically
 from pipeline.store.png import SIGNATURE, png_size, read_png
-from pipeline.store.raster import Raster
+from pipeline.store.raster import MAX_BYTES, Raster
 from pipeline.store.tiff import read_tiff, tiff_size
 
 SUFFIXES = (".png", ".tif", ".tiff")
@@ -96,6 +96,10 @@ def _decoded(path: Path, page: int | None) -> Raster:
 def _named(path: Path, read: Callable[[bytes], T]) -> T:
     """What `read` makes of the file's bytes; its refusals get the file's name."""
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(
+                f"{path.name}: has {path.stat().st_size / 1e9:.1f} GB, the limit is {MAX_BYTES / 1e9:.1f} GB"
+            )
         content = path.read_bytes()
     except FileNotFoundError:
         raise MissingFileError(f"{path.name}: does not exist in {path.parent}") from None

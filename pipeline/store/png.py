@@ -15,7 +15,15 @@ from pipeline.store.raster import Raster, within_limit
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY = (0, 4)  # colour types: grey, grey with alpha
 _PALETTE = 3
+_SAMPLES = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # values a pixel, by colour type
+_DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}  # ISO/IEC 15948, table 11.1
+_PASSES = {  # first column and row, and step of each pass, by interlace method
+    0: ((0, 0, 1, 1),),
+    1: ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)),
+}
+_PIECE = 2**16  # bytes that are unpacked at a time
 _TRUNCATED = "is truncated: copy it again"
+_DAMAGED = "is damaged"
 
 
 def png_size(content: bytes) -> tuple[int, int]:
@@ -27,6 +35,7 @@ def read_png(content: bytes) -> Raster:
     """Decode a PNG of any kind; a palette image keeps its numbers."""
     rows, columns, colour = _header(content)
     within_limit(rows, columns)
+    _check_pixels(content)
     pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise InputError("holds pixels that cannot be decoded: export it again")
@@ -39,11 +48,42 @@ def read_png(content: bytes) -> Raster:
 
 def _header(content: bytes) -> tuple[int, int, int]:
     """Rows, columns and colour type."""
+    columns, rows, depth, colour, *_, interlace = struct.unpack(">IIBBBBB", _head(content))
+    if depth not in _DEPTHS.get(colour, ()) or interlace not in _PASSES:
+        raise InputError(f"{_DAMAGED} (colour type {colour} with {depth} bits does not exist): export it again")
+    return rows, columns, colour
+
+
+def _head(content: bytes) -> bytes:
     found = dict(_chunks(content))
     if b"IHDR" not in found or len(found[b"IHDR"]) != 13:
         raise InputError("has no image header: export it again")
-    columns, rows, _, colour = struct.unpack(">IIBB", found[b"IHDR"][:10])
-    return rows, columns, colour
+    return found[b"IHDR"]
+
+
+def _check_pixels(content: bytes) -> None:
+    """Refuse a file whose pixels are fewer or more than its header promises; nothing is held in memory."""
+    columns, rows, depth, colour, *_, interlace = struct.unpack(">IIBBBBB", _head(content))
+    bits, wanted = depth * _SAMPLES[colour], 0
+    for column, row, right, down in _PASSES[interlace]:
+        wide, high = max(0, -((column - columns) // right)), max(0, -((row - rows) // down))
+        wanted += high * (1 + (wide * bits + 7) // 8) if wide else 0
+    if _inflated(b"".join(body for name, body in _chunks(content) if name == b"IDAT"), wanted) != wanted:
+        raise InputError(f"{_DAMAGED} (its pixels do not fill {columns} × {rows} px): copy or export it again")
+
+
+def _inflated(packed: bytes, limit: int) -> int:
+    """How many bytes were packed; a little above `limit` where there are more, −1 where they cannot be unpacked."""
+    inflate, total = zlib.decompressobj(), 0
+    try:
+        for at in range(0, len(packed), _PIECE):
+            piece = packed[at : at + _PIECE]
+            while piece and total <= limit:
+                total += len(inflate.decompress(piece, 16 * _PIECE))
+                piece = inflate.unconsumed_tail
+        return total if total > limit else total + len(inflate.flush())
+    except zlib.error:
+        return -1
 
 
 def _palette(content: bytes) -> np.ndarray:

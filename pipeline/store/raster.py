@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.core.errors import InputError
 
 MAX_PIXELS = 300_000_000  # an image as float32 then stays near 1 GB
+MAX_BYTES = 8 * MAX_PIXELS  # of a file: 16 bits of red, green, blue and alpha
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,13 @@ import tifffile
 from pipeline.core.errors import InputError
 from pipeline.store.raster import Raster, within_limit
 
-logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it would complain of is said by our errors
+_GREYS = {tifffile.PHOTOMETRIC.MINISWHITE, tifffile.PHOTOMETRIC.MINISBLACK, tifffile.PHOTOMETRIC.PALETTE}
+_COLOURS = {tifffile.PHOTOMETRIC.RGB, tifffile.PHOTOMETRIC.YCBCR}
+_UNPACKED = (8, 10, 12, 14, 16, 32)  # bits a value that OpenCV decodes
+
+# what they would complain of is said by our errors
+logging.getLogger("tifffile").setLevel(logging.CRITICAL)
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 
 def tiff_size(content: bytes, page: int | None = None) -> tuple[int, int]:
@@ -30,6 +36,7 @@ def read_tiff(content: bytes, page: int | None = None) -> Raster:
     with _opened(content) as file:
         chosen = _page(file, page, len(content))
         within_limit(chosen.imagelength, chosen.imagewidth)
+        _check_kind(chosen)
         try:
             return _raster(chosen.asarray(), chosen)
         except InputError:
@@ -43,6 +50,18 @@ def _opened(content: bytes) -> tifffile.TiffFile:
         return tifffile.TiffFile(io.BytesIO(content))
     except Exception as error:
         raise InputError(f"is neither PNG nor TIFF ({error}): export it as one of them") from None
+
+
+def _check_kind(page: tifffile.TiffPage) -> None:
+    """Refuse pixels that are neither grey values, palette numbers nor colours of red, green and blue."""
+    kind = np.dtype(page.dtype).kind if page.dtype is not None else "?"
+    most = 4 if page.photometric in _COLOURS else 2  # alpha included
+    if page.photometric not in _COLOURS | _GREYS or page.samplesperpixel > most or kind not in "buif":
+        name = getattr(page.photometric, "name", page.photometric)
+        raise InputError(
+            f"holds {page.samplesperpixel} values of type {page.dtype} a pixel ({name}): one grey value is needed, or "
+            "red, green and blue"
+        )
 
 
 def _page(file: tifffile.TiffFile, page: int | None, size: int) -> tifffile.TiffPage:
@@ -87,14 +106,15 @@ def _raster(pixels: np.ndarray, page: tifffile.TiffPage) -> Raster:
 
 
 def _by_opencv(content: bytes, page: tifffile.TiffPage, reason: str) -> Raster:
-    """Decode packings that tifffile leaves to a further library (LZW, PackBits, JPEG)."""
-    plain = page.photometric in (
-        tifffile.PHOTOMETRIC.MINISBLACK,
-        tifffile.PHOTOMETRIC.RGB,
-        tifffile.PHOTOMETRIC.YCBCR,
-    )
+    """Decode packings that tifffile leaves to a further library (LZW, PackBits, JPEG; 10, 12 and 14 bits)."""
+    plain = page.photometric in _COLOURS | {tifffile.PHOTOMETRIC.MINISBLACK} and page.bitspersample in _UNPACKED
     done, pages = cv2.imdecodemulti(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if plain else (False, ())
     if not done or page.index >= len(pages):
-        raise InputError(f"holds pixels that cannot be decoded ({reason}): save it without compression")
-    pixels = pages[page.index]
+        raise InputError(
+            f"holds pixels of {page.bitspersample} bits that cannot be decoded ({reason}): save it with 8 or 16 bits, "
+            "without compression"
+        )
+    pixels = np.asarray(pages[page.index])
+    if page.bitspersample in (10, 12, 14):  # OpenCV fills 16 bits from the top
+        pixels = np.right_shift(pixels, 16 - page.bitspersample)
     return Raster(pixels if pixels.ndim == 2 else np.ascontiguousarray(pixels[:, :, 2::-1]))

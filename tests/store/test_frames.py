@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 
 from pipeline.store.frames import frames_csv, image_files, image_problems, read_frames
 from pipeline.store.images import save_png
@@ -70,3 +71,26 @@ def test_images_of_another_size_and_unreadable_ones_are_named(tmp_path):
         "images/3.png: is truncated: copy it again",
         "images/2.png: has 31 × 20 pixels, the first image 30 × 20: all must be alike",
     ]
+
+
+def test_blank_images_are_named_when_every_pixel_is_looked_at(tmp_path):
+    speckle = np.random.default_rng(0).integers(0, 256, (20, 30), dtype=np.uint8)
+    for i, image in enumerate([speckle, np.full((20, 30), 255, np.uint8), np.zeros((20, 30), np.uint8)]):
+        save_png(tmp_path / f"{i}.png", image)
+    assert image_problems(image_files(tmp_path), thorough=False) == []
+    assert image_problems(image_files(tmp_path), thorough=True) == [
+        "images/1.png: is blank (every pixel has the grey value 255): leave it out, with its time",
+        "images/2.png: is blank (every pixel has the grey value 0): leave it out, with its time",
+    ]
+
+
+def test_images_of_many_kinds_may_stand_side_by_side(tmp_path):
+    speckle = np.random.default_rng(0).integers(0, 256, (20, 30), dtype=np.uint8)
+    save_png(tmp_path / "0.png", speckle)
+    save_png(tmp_path / "1.png", speckle.astype(np.uint16) * 16)
+    save_png(tmp_path / "2.png", np.dstack([speckle] * 3))
+    tifffile.imwrite(tmp_path / "3.tif", speckle.astype(np.float32))
+    assert image_problems(image_files(tmp_path), thorough=True) == []
+    tifffile.imwrite(tmp_path / "4.tif", np.stack([speckle] * 2))
+    problems = image_problems(image_files(tmp_path), thorough=False)
+    assert problems == ["images/4.tif: has 2 pages, one is needed: save the page that is meant as a file of its own"]

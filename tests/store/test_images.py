@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 import zlib
 
 import cv2
@@ -15,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 
 from pipeline.core.errors import InputError, MissingFileError
 from pipeline.store.images import image_size, read_grey, read_labels, save_png
-from pipeline.store.raster import MAX_PIXELS
+from pipeline.store.raster import MAX_BYTES, MAX_PIXELS
 
 GREY = np.random.default_rng(0).integers(0, 256, (40, 60), dtype=np.uint8)
 COLOUR = np.random.default_rng(1).integers(0, 256, (40, 60, 3), dtype=np.uint8)
@@ -166,13 +167,103 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
         read_grey(tmp_path / "b.png")
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(40_000, 40_000), (0, 5), (2**31 - 1, 2**31 - 1)])
-def test_an_image_too_large_or_without_pixels_is_refused_before_it_is_decoded(tmp_path, columns, rows):
-    head = chunk(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 0, 0, 0, 0))
-    (tmp_path / "x.png").write_bytes(b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", b"") + chunk(b"IEND", b""))
-    with pytest.raises(InputError, match=f"{columns} × {rows} pixels"):
-        read_grey(tmp_path / "x.png")
-    assert MAX_PIXELS < 40_000**2
+def tiff_header(columns: int, rows: int, bits: int, data: bytes, **tags: int) -> bytes:
+    """A TIFF of one strip of grey values after the standard (revision 6.0)."""
+    entries = {256: columns, 257: rows, 258: bits, 259: 1, 262: 1, 273: 8 + 2 + 9 * 12 + 4, 277: 1, 278: rows}
+    entries |= {279: len(data)} | {int(k[1:]): v for k, v in tags.items()}
+    rows_of = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in sorted(entries.items()))
+    return b"II*\0" + struct.pack("<IH", 8, len(entries)) + rows_of + bytes(4) + data
+
+
+def plain_png(columns: int, rows: int, depth: int, colour: int, pixels: bytes) -> bytes:
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", columns, rows, depth, colour, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("kind", ["png", "tif"])
+@pytest.mark.parametrize(("columns", "rows"), [(50_000, 50_000), (0, 5), (2**31 - 1, 2**31 - 1)])
+def test_an_image_too_large_or_without_pixels_is_refused_before_it_is_decoded(tmp_path, columns, rows, kind):
+    path = tmp_path / f"x.{kind}"
+    make = plain_png if kind == "png" else tiff_header
+    path.write_bytes(make(columns, rows, 8, *((0,) if kind == "png" else ()), bytes(100)))
+    tracemalloc.start()
+    for read in (read_grey, image_size):
+        with pytest.raises(InputError, match=f"{columns} × {rows} pixels"):
+            read(path)
+    assert tracemalloc.get_traced_memory()[1] < 10e6  # bytes: nothing of the image's size is made
+    tracemalloc.stop()
+    assert MAX_PIXELS < 50_000**2
+
+
+def test_a_file_too_large_is_not_read(tmp_path):
+    with (tmp_path / "x.tif").open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    with pytest.raises(InputError, match=r"^x\.tif: has 2\.4 GB, the limit is 2\.4 GB"):
+        read_grey(tmp_path / "x.tif")
+
+
+def test_twelve_bits_packed_tightly_are_read(tmp_path):
+    levels = np.random.default_rng(4).integers(0, 4096, (40, 60))
+    one, two = levels[:, ::2], levels[:, 1::2]
+    packed = np.stack([one >> 4, (one & 15) << 4 | two >> 8, two & 255], axis=-1).astype(np.uint8)
+    (tmp_path / "x.tif").write_bytes(tiff_header(60, 40, 12, packed.tobytes()))
+    assert np.array_equal(read_grey(tmp_path / "x.tif"), levels)
+
+
+def test_a_grey_palette_tiff_gives_its_greys(tmp_path):
+    ramp = np.stack([np.arange(255, -1, -1) * 257] * 3).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "x.tif", GREY, photometric="palette", colormap=ramp)
+    assert np.allclose(read_grey(tmp_path / "x.tif"), (255.0 - GREY) * 257, rtol=1e-6)  # single precision
+    assert np.array_equal(read_labels_of(tmp_path, GREY % 4, ramp), GREY % 4)
+
+
+def read_labels_of(folder, labels, ramp):
+    tifffile.imwrite(folder / "labels.tif", labels, photometric="palette", colormap=ramp)
+    return read_labels(folder / "labels.tif")
+
+
+@pytest.mark.parametrize(
+    ("pixels", "options"),
+    [
+        (np.dstack([COLOUR, GREY]), {"photometric": "separated"}),
+        (np.dstack([COLOUR, GREY, GREY]), {"photometric": "minisblack", "planarconfig": "contig"}),
+        (GREY.astype(np.complex64), {}),
+    ],
+    ids=["cyan, magenta, yellow, black", "five values", "complex"],
+)
+def test_pixels_that_are_neither_grey_nor_colours_are_refused(tmp_path, pixels, options):
+    tifffile.imwrite(tmp_path / "x.tif", pixels, **options)
+    with pytest.raises(InputError, match=r"^x\.tif: holds \d values of type \w+ a pixel .* one grey value is needed"):
+        read_grey(tmp_path / "x.tif")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (plain_png(60, 40, 8, 0, bytes(61 * 40 - 1)), r"its pixels do not fill 60 × 40 px"),
+        (plain_png(60, 40, 8, 0, bytes(10**8)), r"its pixels do not fill 60 × 40 px"),
+        (plain_png(60, 40, 5, 0, bytes(61 * 40)), r"colour type 0 with 5 bits does not exist"),
+        (plain_png(60, 40, 8, 7, bytes(61 * 40)), r"colour type 7 with 8 bits does not exist"),
+        (tiff_header(60, 40, 4, bytes(30 * 40)), r"holds pixels of 4 bits that cannot be decoded"),
+    ],
+)
+def test_what_no_camera_writes_is_refused_and_nothing_else_is_said(tmp_path, capfd, content, sentence):
+    (tmp_path / "x").write_bytes(content)
+    with pytest.raises(InputError, match=sentence):
+        read_grey(tmp_path / "x")
+    assert capfd.readouterr() == ("", "")  # the decoders below keep quiet
+
+
+def test_interlaced_and_narrow_pngs_are_whole(tmp_path):
+    for depth, width in ((1, 13), (2, 5), (4, 7)):
+        row = b"\0" + bytes([0b10110001] * ((width * depth + 7) // 8))
+        (tmp_path / "x.png").write_bytes(plain_png(width, 3, depth, 0, row * 3))
+        assert read_grey(tmp_path / "x.png").shape == (3, width)
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", 3, 3, 8, 0, 0, 0, 1))  # passes 1, 4, 5, 6 and 7 hold 1, 1, 2, 2 and 3
+    rows = b"\0\x09" + b"\0\x07" + b"\0\x05\x06" + b"\0\x08" * 2 + b"\0\x01\x02\x03"
+    body = chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    (tmp_path / "y.png").write_bytes(b"\x89PNG\r\n\x1a\n" + head + body)
+    assert read_grey(tmp_path / "y.png").tolist() == [[9, 8, 7], [1, 2, 3], [5, 8, 6]]
 
 
 def test_nan_grey_levels_are_refused(tmp_path):
