@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import __version__
+from pipeline.core.particles import Phase
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import ligament_area
 from pipeline.core.units import MM
@@ -95,6 +96,7 @@ def test_result(problem: Problem, solution: Solution, points: np.ndarray, seen: 
         "particles": problem.particles.count,
         "bonds": problem.bonds.count,
         "broken_bonds": int(np.count_nonzero(solution.reached >= problem.law.delta_max)),
+        "by_phase": breakage(problem, solution),
         "steps": solution.steps,
         "quasi_static_error": solution.quasi_static_error,
         "converged": solution.converged,
@@ -105,6 +107,19 @@ def test_result(problem: Problem, solution: Solution, points: np.ndarray, seen: 
             "displacement_mm": seen / MM,
             "load_n": curve.load_at(solution.cmod),
         },
+    }
+
+
+def breakage(problem: Problem, solution: Solution) -> dict[str, dict[str, float]]:
+    """Broken bonds and dissipated energy of each phase of bonds: what the crack had to break."""
+    broken = solution.reached >= problem.law.delta_max
+    spent = problem.law.dissipated(solution.reached)
+    return {
+        Phase(phase).name.lower(): {
+            "broken_bonds": int(np.count_nonzero(broken & (problem.bonds.phase == phase))),
+            "dissipated_j": float(spent[problem.bonds.phase == phase].sum()),
+        }
+        for phase in np.unique(problem.bonds.phase).tolist()
     }
 
 
