@@ -72,6 +72,8 @@ def stream_fields(
         valid, std = _growing(file, "valid", shape, "bool", "1"), _growing(file, "std_mm", shape, "float64", "mm")
         count = 0
         for number, (moved, usable, spread) in enumerate(frames):
+            if number == time.size:
+                raise StoreError(f"{path.name}: more frames came than the {number} times")
             wide[number], valid[number], std[number] = moved / MM, usable, spread / MM
             count += 1
         if count != time.size:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import h5py
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from pipeline.core.errors import StoreError
 from pipeline.core.field import DisplacementField
 from pipeline.core.units import MM
-from pipeline.store.fields import field_problems, read_fields, write_fields
+from pipeline.store.fields import field_problems, read_fields, stream_fields, write_fields
 
 
 def random_field(frames: int, n: int, spread: str) -> DisplacementField:
@@ -44,6 +45,46 @@ def test_write_then_read_is_the_identity(tmp_path_factory, frames, n, spread):
         assert np.allclose(getattr(read, name), getattr(field, name), rtol=1e-15, atol=0)  # m → mm → m
     assert np.array_equal(read.valid, field.valid)
     assert np.array_equal(read.abscissa, field.abscissa)
+
+
+def by_frames(field):
+    return zip(field.displacement, field.valid, field.std, strict=True)
+
+
+def test_frame_by_frame_is_the_same_as_at_once(tmp_path):
+    field = random_field(5, 300, "all")
+    stream_fields(tmp_path / "streamed.h5", field.points, field.abscissa, by_frames(field))
+    write_fields(tmp_path / "whole.h5", field)
+    streamed, whole = (read_fields(tmp_path / name) for name in ("streamed.h5", "whole.h5"))
+    for name in ("points", "displacement", "std", "valid", "abscissa"):
+        np.testing.assert_array_equal(getattr(streamed, name), getattr(whole, name))
+
+
+def test_one_frame_at_a_time_is_in_memory(tmp_path):
+    n, frames, alive = 20000, 40, []
+
+    def told():
+        for _ in range(frames):
+            alive.append(1)
+            yield np.zeros((n, 2)), np.ones(n, bool), np.zeros(n)
+
+    tracemalloc.start()
+    stream_fields(tmp_path / "f.h5", np.random.default_rng(0).random((n, 2)), np.arange(frames, dtype=float), told())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(alive) == frames
+    assert peak < 8 * n * 24  # bytes; all 40 frames would be 40 n 25
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_series_that_stops_early_leaves_the_old_file(tmp_path, count):
+    field, path = random_field(3, 10, "all"), tmp_path / "fields.h5"
+    write_fields(path, field)
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="frames came"):
+        stream_fields(path, field.points, np.arange(count, dtype=float), by_frames(field))
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["fields.h5"]
 
 
 @pytest.fixture

@@ -1,0 +1,103 @@
+"""The camera's clock, and what is told where it cannot be found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.core.specimen import SingleEdgeNotchedBeam
+from pipeline.core.units import MM
+from pipeline.store.bundle import read_bundle
+from pipeline.store.new import Contents, first_experiment, write_bundle
+from pipeline.study.gauge import Opening, Timing, _height, remarks, sentence, synchronised
+from pipeline.study.measurement import frames_at_rest
+
+TIME = np.arange(0, 60, 0.2)
+CMOD = 8e-6 * np.maximum(TIME - 8, 0)
+BEAM = SingleEdgeNotchedBeam(60 * MM, 130 * MM, 137 * MM, 40 * MM, 15 * MM)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundles") / "b"
+    write_bundle(folder, first_experiment("seb", "b"), Contents())
+    return replace(read_bundle(folder), curve=LoadCurve(TIME, CMOD, 1 + 0 * TIME))
+
+
+def given(bundle, offset):
+    section = bundle.experiment.dic.model_copy(update={"sync_offset_s": offset})
+    return replace(bundle, experiment=bundle.experiment.model_copy(update={"dic": section}))
+
+
+def seen(stamp, late, gain=1.0, at_gauge=True, noise=1e-6):
+    value = gain * np.interp(stamp - late, TIME, CMOD) + np.random.default_rng(0).normal(0, noise, stamp.size)
+    return Opening(value, np.full(stamp.size, noise), 0.0 if at_gauge else 5 * MM, at_gauge)
+
+
+STAMP = np.arange(3.0, 50, 1.0)
+
+
+def test_the_clock_is_estimated_with_its_error(bundle):
+    found = synchronised(bundle, STAMP, seen(STAMP, 2.5))
+    assert found.how == "estimated"
+    assert found.offset == pytest.approx(2.5, abs=5 * found.std)  # five deviations
+    assert found.gain == 1.0
+    assert sentence(found) == f"camera +{found.offset:.3f} ± {found.std:.3f} s against the record"
+    assert remarks(found) == []
+
+
+def test_away_from_the_gauge_the_gain_is_fitted_and_told(bundle):
+    found = synchronised(bundle, STAMP, seen(STAMP, -1.0, gain=0.7, at_gauge=False))
+    assert found.offset == pytest.approx(-1.0, abs=5 * found.std)  # five deviations
+    assert found.gain == pytest.approx(0.7, abs=0.01)
+    assert remarks(found) == ["the gauge is not in the images: the opening was measured at y = 5.0 mm and is 0.70 "
+                              "times the record's CMOD"]  # fmt: skip
+
+
+def test_an_offset_that_was_given_is_taken(bundle):
+    found = synchronised(given(bundle, 2.0), STAMP, seen(STAMP, 2.5))
+    assert (found.offset, found.std, found.how) == (2.0, None, "given")
+    assert found.rms < 8e-6  # what half a second makes of the rate
+    assert synchronised(given(bundle, 2.0), STAMP, None).offset == 2.0
+
+
+def test_without_a_record_the_camera_keeps_its_time(bundle):
+    found = synchronised(replace(bundle, curve=None), STAMP, seen(STAMP, 2.5))
+    assert (found.offset, found.std, found.how) == (0.0, None, "no record")
+    assert "no load record" in sentence(found)
+
+
+def test_what_cannot_be_synchronised_says_what_to_do(bundle):
+    with pytest.raises(InputError, match="give \\[dic\\] sync_offset_s"):
+        synchronised(bundle, STAMP, None)
+    value = 8e-6 * STAMP + np.random.default_rng(0).normal(0, 1e-7, STAMP.size)
+    ramp = Opening(value, np.full(STAMP.size, 1e-7), 0.0, True)
+    moving = replace(bundle, curve=LoadCurve(TIME, 8e-6 * TIME, 1 + 0 * TIME))
+    with pytest.raises((InputError, ConvergenceError), match=r"load_cmod.csv: .*; or give \[dic\] sync_offset_s"):
+        synchronised(moving, STAMP[20:30], replace(ramp, value=ramp.value[20:30], std=ramp.std[20:30]))
+    assert remarks(Timing(0.0, None, "no record")) == [
+        "the images do not show the flanks of the notch: the opening was not measured"
+    ]
+
+
+@pytest.mark.parametrize(("low", "height"), [(0.5, 0.0), (4.0, 3.0), (16.0, None)])
+def test_the_gauge_stands_as_low_as_there_are_points(low, height):
+    x, y = np.meshgrid(np.arange(-10, 10.1, 0.5), np.arange(low, 30, 0.5))
+    points = np.column_stack([x.ravel(), y.ravel()]) * MM
+    found = _height(points, BEAM, 2 * MM, 2 * MM)
+    if height is None:
+        assert found is None
+    else:
+        assert found / MM == pytest.approx(height, abs=0.51)  # looked for in steps of 0.5 mm
+
+
+@pytest.mark.parametrize(
+    ("ratio", "count"),
+    [([1.0, 1.03, 0.98, 1.2, 3.0], 3), ([2.0, 2.1, 2.05, 2.6], 3), ([1.4, 2.0, 3.0], 1), ([5.0, 9.0], 0), ([1.0], 1)],
+)
+def test_frames_at_rest_end_where_the_scatter_grows(ratio, count):
+    assert frames_at_rest(np.array(ratio)) == count
