@@ -1,0 +1,169 @@
+"""The creeping bond: elastic limit, onset of softening in time, and what stays as without creep."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from pipeline.core.errors import InputError
+from pipeline.materials.burgers import Burgers
+from pipeline.materials.cohesive import LinearSoftening
+from pipeline.materials.creeping_softening import BondState, CreepingSoftening
+from pipeline.materials.prony import PronySeries
+from pipeline.materials.relaxation import arms
+
+MASTIC = Burgers(d1=1e-10, d2=0.7e-10, eta1=1e12, tau2=10.0).relaxation()
+SHARE = 0.0444  # m; K^n = 4.4e8 N/m at E(0) = 10 GPa
+F, D = 71.0, 1.14e-4
+
+
+def bonds(series: PronySeries = MASTIC, count: int = 1, f_max: float = F, delta_max: float = D) -> CreepingSoftening:
+    return CreepingSoftening(arms(series, np.full(count, SHARE)), np.full(count, f_max), np.full(count, delta_max))
+
+
+def follow(law: CreepingSoftening, openings: np.ndarray, durations: np.ndarray) -> tuple[np.ndarray, BondState]:
+    """Forces (steps,) of one bond along a path."""
+    state, forces = law.at_rest(), []
+    for opening, duration in zip(openings, durations, strict=True):
+        at = np.array([opening])
+        forces.append(float(law.force(state, at, duration)[0]))
+        state = law.advance(state, at, duration)
+    return np.array(forces), state
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-2e-5, 1.5e-4), min_size=1, max_size=20))
+def test_what_does_not_relax_is_the_elastic_law(openings):
+    slow = PronySeries(0.0, np.array([1e10]), np.array([1e30]))
+    elastic = LinearSoftening(np.array([1e10 * SHARE]), np.array([F]), np.array([D]))
+    reached, wanted = np.zeros(1), []
+    for opening in openings:
+        wanted.append(float(elastic.force(np.array([opening]), reached)[0]))
+        reached = elastic.reached(np.array([opening]), reached)
+    found, _ = follow(bonds(slow), np.array(openings), np.ones(len(openings)))
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9 * F)  # sums of increments for a product
+
+
+def rate_onset(rate: float) -> float:
+    """δ* of a bond pulled at a constant rate, from the closed form of its force."""
+
+    def above(time: float) -> float:
+        return SHARE * rate * float(np.sum(MASTIC.modulus * MASTIC.time * -np.expm1(-time / MASTIC.time))) - F
+
+    return rate * brentq(above, 0, 1e4, xtol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [2e-8, 2e-7, 1e-5])
+def test_onset_at_a_constant_rate(rate):
+    onset = rate_onset(rate)
+    errors = []
+    for count in (200, 400, 800):
+        steps = np.linspace(0, 1.5 * onset, count + 1)
+        forces, state = follow(bonds(), steps[1:], np.diff(steps) / rate)
+        errors.append(abs(float(state.onset[0]) / onset - 1))
+        before = steps[1:] < 0.99 * onset
+        time = steps[1:][before] / rate
+        grown = -np.expm1(-np.divide.outer(time, MASTIC.time)) @ (MASTIC.modulus * MASTIC.time)
+        assert forces[before] == pytest.approx(SHARE * rate * grown, rel=1e-11)  # hundreds of roundings
+    assert errors[-1] < 2e-3
+    assert errors[-1] < 0.6 * errors[0]  # the step that holds the onset: first order
+
+
+def test_slower_is_longer():
+    assert rate_onset(2e-8) > rate_onset(2e-7) > rate_onset(1e-5) > F / (SHARE * MASTIC.instantaneous)
+
+
+def test_softening_is_a_straight_line_from_the_onset():
+    openings = np.linspace(0, 1.2 * D, 4001)[1:]
+    forces, state = follow(bonds(), openings, np.full(openings.size, 1e-3))
+    onset = float(state.onset[0])
+    after = openings > onset
+    line = F * np.clip((D - openings[after]) / (D - onset), 0, 1)
+    assert forces[after] == pytest.approx(line, rel=1e-9, abs=1e-9 * F)  # rounding of a quotient near zero
+    assert forces.max() <= F * (1 + 1e-12)  # rounding
+    area = np.trapezoid(forces[after], openings[after]) / (F * (D - onset) / 2)
+    assert area == pytest.approx(1, abs=1e-3)  # the step across the onset
+
+
+def test_creep_stops_where_softening_has_begun():
+    law = bonds()
+    _, state = follow(law, np.array([5e-5]), np.array([1.0]))
+    assert state.softened.all()
+    held = law.advance(state, np.array([5e-5]), 1e4)
+    before, after = (law.force(s, np.array([5e-5]), 0.0) for s in (state, held))
+    assert after == pytest.approx(before, rel=1e-15)  # the same numbers
+
+
+def test_unloading_goes_to_the_origin_and_compression_is_elastic():
+    law = bonds()
+    _, state = follow(law, np.array([5e-5]), np.array([1.0]))
+    full = float(law.force(state, np.array([5e-5]), 1.0)[0])
+    assert float(law.force(state, np.array([2e-5]), 1.0)[0]) == pytest.approx(0.4 * full, rel=1e-12)  # a product
+    pressed = law.force(state, np.array([-1e-6]), 1.0)
+    assert pressed == pytest.approx(-1e-6 * SHARE * MASTIC.instantaneous, rel=1e-12)  # a product
+
+
+def test_below_its_strength_a_bond_never_fails_by_opening_alone():
+    # so slow that the force stays below f_max: far beyond delta_max the dashpot carries η v
+    rate = 0.5 * F / (SHARE * MASTIC.viscosity)
+    openings = np.linspace(0, 5 * D, 200)[1:]
+    forces, state = follow(bonds(), openings, np.full(openings.size, openings[0] / rate))
+    assert not state.softened.any()
+    assert forces[-1] == pytest.approx(0.5 * F, rel=1e-6)  # arms have settled
+
+
+def test_a_bond_that_reaches_its_strength_beyond_delta_max_breaks_at_once():
+    rate = 0.9 * F / (SHARE * MASTIC.viscosity)
+    slow = np.linspace(0, 1.5 * D, 300)[1:]
+    openings = np.append(slow, [1.5 * D + 1e-6, 1.6 * D])
+    durations = np.append(np.full(slow.size, slow[0] / rate), [1e-3, 1.0])
+    forces, state = follow(bonds(), openings, durations)
+    assert forces[-3] > 0.85 * F
+    assert forces[-2:].tolist() == [0.0, 0.0]
+    assert D < state.onset[0] < 1.5 * D + 1e-6
+
+
+def test_undamaged_compression_creeps():
+    law = bonds()
+    _, state = follow(law, np.array([-1e-6]), np.array([0.0]))
+    later = law.force(law.advance(state, np.array([-1e-6]), 50.0), np.array([-1e-6]), 0.0)
+    assert later == pytest.approx(-1e-6 * SHARE * MASTIC.relaxation_modulus(50.0), rel=1e-12)  # an exponential
+
+
+def test_work_is_stored_crept_or_spent_on_the_way_to_the_peak():
+    law = bonds()
+    openings = np.linspace(0, 0.9 * rate_onset(2e-7), 400)
+    state, work, used = law.at_rest(), 0.0, 0.0
+    for a, b in pairwise(openings):
+        at, duration = np.array([b]), (b - a) / 2e-7
+        before = float(law.force(state, np.array([a]), 0.0)[0])
+        work += 0.5 * (before + float(law.force(state, at, duration)[0])) * (b - a)
+        used += float(law.crept(state, at, duration)[0])
+        state = law.advance(state, at, duration)
+    assert float(law.stored(state)[0]) + used == pytest.approx(work, rel=1e-5)  # trapezoids of the work
+
+
+def test_bonds_without_damage_never_soften():
+    law = CreepingSoftening(arms(MASTIC, np.full(2, SHARE)), np.array([np.inf, F]), np.array([np.inf, D]))
+    state = law.at_rest()
+    for opening in np.linspace(0, 2 * D, 50):
+        state = law.advance(state, np.full(2, opening), 1e-3)
+    assert state.softened.tolist() == [False, True]
+    force = law.force(state, np.full(2, 2 * D), 0.0)
+    assert force[0] > F
+    assert force[1] == 0
+    assert np.isfinite(law.stored(state)).all()
+
+
+def test_refusals():
+    with pytest.raises(InputError, match="f_max = 0 of a creeping bond"):
+        bonds(f_max=0.0)
+    with pytest.raises(InputError, match="delta_max = -1 of a creeping bond"):
+        bonds(delta_max=-1.0)
+    with pytest.raises(InputError, match="2 bonds for the arms of 1"):
+        CreepingSoftening(arms(MASTIC, np.array([SHARE])), np.full(2, F), np.full(1, D))
