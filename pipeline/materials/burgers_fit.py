@@ -12,6 +12,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats import t as student
 
 from pipeline.core.errors import InputError
+from pipeline.core.units import GPA
 from pipeline.materials.burgers import Burgers
 from pipeline.materials.residuals import inflation
 from pipeline.materials.series_fit import creep_design, not_negative, refuse_data
@@ -239,6 +240,6 @@ def _refuse_poor(time: np.ndarray, compliance: np.ndarray) -> None:
     third = max(time.size // 3, 1)
     if compliance[-third:].mean() <= compliance[:third].mean():
         raise InputError(
-            f"the creep compliance does not grow, from {compliance[:third].mean():.4g} to "
-            f"{compliance[-third:].mean():.4g} 1/Pa: is it a modulus, or another column?"
+            f"the creep compliance does not grow, from {compliance[:third].mean() * GPA:.4g} to "
+            f"{compliance[-third:].mean() * GPA:.4g} 1/GPa: is it a modulus, or another column?"
         )

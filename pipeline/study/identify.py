@@ -37,7 +37,7 @@ from pipeline.study.observation import at_stations, measured_test, observe_solut
 from pipeline.study.output import results_folder
 from pipeline.study.pages import identification_page
 from pipeline.study.prospects import refuse_hopeless
-from pipeline.study.simulate import curve_result
+from pipeline.study.simulate import cmod_energy, curve_result
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,9 @@ def identification_result(
 ) -> dict[str, Any]:
     """The estimate by the keys of result.json; f_max per bond of the bundle's lattice."""
     cmod, load = optimum.curve.peak()
-    measured_cmod, measured_load = campaign.model.bundle.need_curve().peak()
+    record = campaign.model.bundle.need_curve()
+    measured_cmod, measured_load = record.peak()
+    measured_energy = cmod_energy(record.until(float(optimum.curve.cmod[-1])), problem.specimen)
     doubt = found.uncertainty
     area = 2 * campaign.model.bundle.model.radius * problem.specimen.thickness
     return {
@@ -289,6 +291,8 @@ def identification_result(
         "measured_cmod_at_peak_mm": measured_cmod / MM,
         "peak_load_mismatch": load / measured_load - 1,
         "fracture_energy_j_per_m2": optimum.energy.external / ligament_area(problem.specimen),
+        **cmod_energy(optimum.curve, problem.specimen),
+        "measured_cmod_fracture_energy_j_per_m2": measured_energy["cmod_fracture_energy_j_per_m2"],
     }
 
 
