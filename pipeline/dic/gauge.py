@@ -49,6 +49,46 @@ def opening(
     return total, np.sqrt(variance)
 
 
+def rigid_opening(
+    field: DisplacementField, left: np.ndarray, right: np.ndarray, arms: tuple[np.ndarray, np.ndarray], shared: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The opening at feet that no picture shows, each carried by its arm as by a rigid body.
+
+    Parameters
+    ----------
+    field : DisplacementField
+    left, right : (2,) arrays, m; feet of the gauge
+    arms : two (n,) bool arrays; the points of the left and of the right arm
+    shared : float, m; as of `opening`
+
+    Returns
+    -------
+    opening, std : (frames,) arrays, m; NaN where an arm has fewer than three valid points
+    """
+    along = (right - left) / np.linalg.norm(right - left)
+    total, variance = np.zeros(len(field.abscissa)), np.zeros(len(field.abscissa))
+    for foot, arm, sign in ((left, arms[0], -1.0), (right, arms[1], 1.0)):
+        for frame, usable in enumerate(field.valid):
+            use = arm & usable
+            if use.sum() < 3:
+                total[frame] = np.nan
+                continue
+            weight = _rigid_weight(field.points[use], foot, along)
+            total[frame] += sign * np.sum(weight * field.displacement[frame][use])
+            error = weight * field.std[frame][use][:, None]
+            overlap = _overlap(field.points[use], shared)
+            variance[frame] += sum(float(e @ overlap @ e) for e in error.T)
+    return total, np.sqrt(variance)
+
+
+def _rigid_weight(points: np.ndarray, foot: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Weights (n, 2) whose sum with displacements is the motion of a foot that goes with them as one rigid body."""
+    arm = points - points.mean(axis=0)
+    reach = foot - points.mean(axis=0)
+    turned, lever = np.column_stack([-arm[:, 1], arm[:, 0]]), np.array([-reach[1], reach[0]])
+    return along / len(points) + turned * float(lever @ along) / np.sum(arm**2)
+
+
 def _foot(
     field: DisplacementField, near: np.ndarray, foot: np.ndarray, along: np.ndarray, shared: float
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -34,13 +34,20 @@ class Synchronisation:
 
 
 def synchronise(
-    time: np.ndarray, opening: np.ndarray, record: LoadCurve, *, reach: float | None = None, fit_gain: bool = False
+    time: np.ndarray,
+    opening: np.ndarray,
+    record: LoadCurve,
+    *,
+    reach: float | None = None,
+    fit_gain: bool = False,
+    fit_bending: bool = False,
 ) -> Synchronisation:
     """Shift the frames until the opening they show lies on the record's CMOD.
 
-    The opening seen is modelled as gain × CMOD(t − offset) + zero and fitted by least squares; a ramp alone cannot
-    tell an offset from a zero, so first motion or a change of rate must be in both. The error comes from the
-    curvature of the sum of squares, with what is left taken as correlated over neighbouring frames.
+    The opening seen is modelled as gain × CMOD(t − offset) + bending × load(t − offset) + zero and fitted by least
+    squares; a ramp alone cannot tell an offset from a zero, so first motion or a change of rate must be in both. The
+    error comes from the curvature of the sum of squares, with what is left taken as correlated over neighbouring
+    frames.
 
     Parameters
     ----------
@@ -49,6 +56,7 @@ def synchronise(
     record : LoadCurve
     reach : float, s, optional; largest offset looked for, a third of the shorter span unless given
     fit_gain : bool; also fit the gain (clip gauge and camera do not span the same points)
+    fit_bending : bool; also fit a part that follows the load (what lies between those points bends)
 
     Raises
     ------
@@ -65,7 +73,8 @@ def synchronise(
     span = min(np.ptp(time), np.ptp(record.time))
     reach = span / 3 if reach is None else reach
     trial = np.linspace(-reach, reach, 401)
-    cost = np.array([_left(o, time, opening, record, fit_gain)[0] for o in trial])
+    fit = _Fit(time, opening, record, fit_gain, fit_bending)
+    cost = np.array([fit.at(o)[0] for o in trial])
     if not np.isfinite(cost).any():
         raise InputError(
             f"frames ({time[0]:g} to {time[-1]:g} s) and record ({record.time[0]:g} to {record.time[-1]:g} s) do not "
@@ -74,7 +83,7 @@ def synchronise(
     best = int(np.nanargmin(np.where(np.isfinite(cost), cost, np.nan)))
     step = trial[1] - trial[0]
     found = minimize_scalar(
-        lambda o: _left(o, time, opening, record, fit_gain)[0],
+        lambda o: fit.at(o)[0],
         bounds=(trial[best] - step, trial[best] + step),
         method="bounded",
         options={"xatol": 1e-6 * step},
@@ -82,40 +91,53 @@ def synchronise(
     offset = float(found.x)
     if abs(offset) > reach - step:
         raise ConvergenceError(f"the best offset lies at the end of the reach of ±{reach:g} s: give a larger reach")
-    _, left, slope, (gain, zero), used = _left(offset, time, opening, record, fit_gain)
-    std = _error(left, slope, gain * np.interp(time[used] - offset, record.time, record.cmod), fit_gain)
+    _, left, slope, basis, (gain, zero) = fit.at(offset)
+    std = _error(left, slope, basis)
     if std > reach:
         raise ConvergenceError(
             "the offset cannot be told from a shift of the opening: the frames show neither the first motion nor a "
             "change of rate; give sync_offset_s by hand"
         )
-    return Synchronisation(offset, std, gain, zero, float(np.sqrt(np.mean(left**2))), int(used.sum()))
+    return Synchronisation(offset, std, gain, zero, float(np.sqrt(np.mean(left**2))), left.size)
 
 
-def _left(
-    offset: float, time: np.ndarray, opening: np.ndarray, record: LoadCurve, fit_gain: bool
-) -> tuple[float, np.ndarray, np.ndarray, tuple[float, float], np.ndarray]:
-    """Mean square, what is left, d(opening)/d(offset), (gain, zero) and the frames that overlap with the record."""
-    at = time - offset
-    used = (at >= record.time[0]) & (at <= record.time[-1])
-    empty = np.zeros(0)
-    if used.sum() < max(8, 0.5 * time.size):
-        return np.inf, empty, empty, (1.0, 0.0), used
-    cmod = np.interp(at[used], record.time, record.cmod)
-    seen = opening[used]
-    if fit_gain:
-        gain, zero = (float(v) for v in np.polyfit(cmod, seen, 1))
-    else:
-        gain, zero = 1.0, float(np.mean(seen - cmod))
-    left = seen - gain * cmod - zero
-    half = 0.5 * np.median(np.diff(time))
-    rate = [np.interp(at[used] + s * half, record.time, record.cmod) for s in (-1, 1)]
-    return float(np.mean(left**2)), left, -gain * (rate[1] - rate[0]) / (2 * half), (gain, zero), used
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What is seen against what is recorded, at any offset; arguments as of `synchronise`."""
+
+    time: np.ndarray
+    opening: np.ndarray
+    record: LoadCurve
+    fit_gain: bool
+    fit_bending: bool
+
+    def at(self, offset: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, tuple[float, float]]:
+        """Mean square, what is left, d(opening)/d(offset), what else is fitted, (gain, zero); infinite where fewer
+        than half of the frames overlap with the record."""
+        record, at = self.record, self.time - offset
+        used = (at >= record.time[0]) & (at <= record.time[-1])
+        if used.sum() < max(8, 0.5 * self.time.size):
+            return np.inf, np.zeros(0), np.zeros(0), np.zeros((0, 1)), (1.0, 0.0)
+        cmod, cmod_rate = self._read(record.cmod, at[used])
+        load, load_rate = self._read(record.load / np.abs(record.load).max(), at[used])
+        columns = [np.ones_like(cmod), *([cmod] if self.fit_gain else []), *([load] if self.fit_bending else [])]
+        basis = np.column_stack(columns)
+        wanted = self.opening[used] - (0.0 if self.fit_gain else cmod)
+        value = np.linalg.lstsq(basis, wanted, rcond=None)[0]
+        left = wanted - basis @ value
+        gain = float(value[1]) if self.fit_gain else 1.0
+        slope = -gain * cmod_rate - (value[-1] * load_rate if self.fit_bending else 0.0)
+        return float(np.mean(left**2)), left, slope, basis, (gain, float(value[0]))
+
+    def _read(self, signal: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A signal of the record and its rate at times (s), the rate over the distance of two frames."""
+        half = 0.5 * float(np.median(np.diff(self.time)))
+        before, now, after = (np.interp(at + s * half, self.record.time, signal) for s in (-1, 0, 1))
+        return now, (after - before) / (2 * half)
 
 
-def _error(left: np.ndarray, slope: np.ndarray, cmod: np.ndarray, fit_gain: bool) -> float:
-    """Standard deviation of the offset; zero and gain are projected out, correlation widens it."""
-    basis = np.column_stack([np.ones_like(cmod), cmod] if fit_gain else [np.ones_like(cmod)])
+def _error(left: np.ndarray, slope: np.ndarray, basis: np.ndarray) -> float:
+    """Standard deviation of the offset; what else is fitted is projected out, correlation widens it."""
     own = slope - basis @ np.linalg.lstsq(basis, slope, rcond=None)[0]
     variance = float(left @ left) / max(left.size - basis.shape[1] - 1, 1)
     near = float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-300)

@@ -11,8 +11,8 @@ from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.core.field import DisplacementField
 from pipeline.core.specimen import Specimen
-from pipeline.core.units import MM
-from pipeline.dic.gauge import opening
+from pipeline.dic.correlation import Correlation
+from pipeline.dic.gauge import opening, rigid_opening
 from pipeline.dic.synchronise import synchronise
 from pipeline.store.bundle import Bundle
 
@@ -21,23 +21,22 @@ if TYPE_CHECKING:
 
 FEET = 12  # points that a foot of the gauge needs on its side
 SUBSETS = 2  # edges of a subset that a foot reaches
+HIGH = 3  # edges of a subset that an arm must be high, to show how it turns
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """What a clip gauge at the given height would have shown.
+    """What a clip gauge would have shown.
 
     Parameters
     ----------
     value, std : (frames,) arrays, m
-    height : float, m; y of its feet
-    at_gauge : bool; the feet are those of the specimen's own gauge
+    shown : bool; the feet of the gauge are in the pictures, else they were carried by the arms as by rigid bodies
     """
 
     value: np.ndarray
     std: np.ndarray
-    height: float
-    at_gauge: bool
+    shown: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,7 @@ class Timing:
 
 
 def notch_opening(specimen: Specimen, series: Series, factor: float) -> Opening | None:
-    """The opening across the notch in every frame, at the gauge or as near to it as points were measured.
+    """The opening at the specimen's gauge in every frame; None where too little of the arms is in the pictures.
 
     Parameters
     ----------
@@ -75,33 +74,60 @@ def notch_opening(specimen: Specimen, series: Series, factor: float) -> Opening 
     """
     points = series.view.point(series.grid.points)
     edge = series.settings.subset_size_px * series.view.metre_per_px
-    reach = max(min(SUBSETS * edge, specimen.notch_length), specimen.gauge_length / 2)
     half = specimen.gauge_length / 2
-    height = _height(points[series.ever], specimen, half, reach)
-    if height is None:
+    feet = np.array([(-half, specimen.gauge_y), (half, specimen.gauge_y)])
+    reach = max(min(SUBSETS * edge, specimen.notch_length), half)
+    shown = all(_stands(points[series.ever], foot, reach) for foot in feet)
+    arms = _arms(points, series.ever, specimen, edge)
+    if not shown and arms is None:
         return None
-    feet = np.array([(-half, height), (half, height)])
     near = series.ever & (np.min([np.hypot(*(points - f).T) for f in feet], axis=0) <= reach)
+    use = near if shown or arms is None else arms[0] | arms[1]
     value, std = np.zeros(len(series)), np.zeros(len(series))
     for frame in series.frames():
-        r = frame.result
-        moved = series.view.vector(np.nan_to_num(r.warp[near, :2]))
-        spread = factor * np.sqrt(np.mean(r.std[near] ** 2, axis=1)) * series.view.metre_per_px
-        field = DisplacementField(
-            points[near], moved[None], r.valid[near][None], np.nan_to_num(spread)[None], np.zeros(1)
-        )
-        (value[frame.number],), (std[frame.number],) = opening(field, feet[0], feet[1], reach, edge)
-    return Opening(value, std, height, bool(abs(height - specimen.gauge_y) < 1e-9))
+        field = _part(series, frame.result, points, use, factor)
+        if shown or arms is None:
+            (value[frame.number],), (std[frame.number],) = opening(field, feet[0], feet[1], reach, edge)
+        else:
+            sides = arms[0][use], arms[1][use]
+            (value[frame.number],), (std[frame.number],) = rigid_opening(field, feet[0], feet[1], sides, edge)
+    return Opening(value, std, shown)
 
 
-def _height(points: np.ndarray, specimen: Specimen, half: float, reach: float) -> float | None:
-    """The height (m) nearest to the gauge at which both feet have points, below the tip; None where there is none."""
-    for height in np.arange(specimen.gauge_y, specimen.tip[1], reach / 4):
-        sides = [points[np.sign(points[:, 0]) == side] for side in (-1, 1)]
-        if all(np.count_nonzero(np.hypot(*(p - (s * half, height)).T) <= 0.8 * reach) >= FEET
-               for p, s in zip(sides, (-1, 1), strict=True)):  # fmt: skip
-            return float(height)
-    return None
+def _part(series: Series, result: Correlation, points: np.ndarray, use: np.ndarray, factor: float) -> DisplacementField:
+    """Some points of one frame in specimen coordinates, m."""
+    moved = series.view.vector(np.nan_to_num(result.warp[use, :2]))
+    spread = factor * np.sqrt(np.mean(result.std[use] ** 2, axis=1)) * series.view.metre_per_px
+    return DisplacementField(
+        points[use], moved[None], result.valid[use][None], np.nan_to_num(spread)[None], np.zeros(1)
+    )
+
+
+def _stands(points: np.ndarray, foot: np.ndarray, reach: float) -> bool:
+    """Whether a foot of the gauge has enough points around it, on its own side of the notch."""
+    own = points[np.sign(points[:, 0]) == np.sign(foot[0])]
+    return bool(np.count_nonzero(np.hypot(*(own - foot).T) <= 0.8 * reach) >= FEET)
+
+
+def _arms(
+    points: np.ndarray, ever: np.ndarray, specimen: Specimen, edge: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Points of the arms on both sides of the notch, thinned to one a subset, clear of the notch and of the tip."""
+    clear = max(specimen.notch_width / 2, 0.0) + edge
+    low = ever & (points[:, 1] < specimen.tip[1] - edge) & (np.abs(points[:, 0]) > clear)
+    thin = _one_a_cell(points, low, edge)
+    arms = thin & (points[:, 0] < 0), thin & (points[:, 0] > 0)
+    long = all(np.count_nonzero(arm) >= FEET and np.ptp(points[arm, 1]) >= HIGH * edge for arm in arms)
+    return arms if long else None
+
+
+def _one_a_cell(points: np.ndarray, use: np.ndarray, edge: float) -> np.ndarray:
+    """The first of the used points in each square of a subset's size: more would only say the same again."""
+    number = np.flatnonzero(use)
+    cell = np.floor(points[number] / edge).astype(int)
+    found = np.zeros(len(points), bool)
+    found[number[np.unique(cell, axis=0, return_index=True)[1]]] = True
+    return found
 
 
 def synchronised(bundle: Bundle, stamp: np.ndarray, seen: Opening | None) -> Timing:
@@ -123,7 +149,8 @@ def synchronised(bundle: Bundle, stamp: np.ndarray, seen: Opening | None) -> Tim
             "opening: give [dic] sync_offset_s"
         )
     try:
-        found = synchronise(stamp, seen.value, bundle.curve, fit_gain=not seen.at_gauge)
+        away = not seen.shown
+        found = synchronise(stamp, seen.value, bundle.curve, fit_gain=away, fit_bending=away)
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"frames.csv against load_cmod.csv: {error}; or give [dic] sync_offset_s") from error
     return Timing(found.offset, found.std, "estimated", found.gain, found.zero, found.rms, seen)
@@ -153,10 +180,11 @@ def remarks(timing: Timing) -> list[str]:
     """What a user should know of the opening that was seen."""
     seen = timing.opening
     if seen is None:
-        return ["the images do not show the flanks of the notch: the opening was not measured"]
-    if not seen.at_gauge:
+        return ["the images do not show enough of both flanks of the notch: the opening was not measured"]
+    if not seen.shown:
         return [
-            f"the gauge is not in the images: the opening was measured at y = {seen.height / MM:.1f} mm and is "
-            f"{timing.gain:.2f} times the record's CMOD"
-        ]
+            "the gauge is not in the images: its opening was told from how the flanks of the notch turn"
+            + (f", {timing.gain:.2f} times the record's CMOD beside a part that follows the load"
+               if timing.how == "estimated" else "")
+        ]  # fmt: skip
     return []

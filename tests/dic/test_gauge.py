@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter
 
 from pipeline.core.errors import InputError
 from pipeline.core.field import DisplacementField
-from pipeline.dic.gauge import opening
+from pipeline.dic.gauge import opening, rigid_opening
 
 X, Y = np.meshgrid(np.linspace(-10e-3, 10e-3, 41), np.linspace(0, 10e-3, 21))
 POINTS = np.column_stack([X.ravel(), Y.ravel()])
@@ -50,6 +50,39 @@ def test_subsets_that_overlap_err_together():
     stated = opening(flat, *feet, shared=edge)[1]
     np.testing.assert_allclose(np.std(draws, axis=0), stated, rtol=0.15)  # three deviations of a deviation of 300
     assert np.all(opening(flat, *feet)[1] < 0.6 * stated)  # as if each were on its own: too good by far
+
+
+def turned(noise=0.0, seed=0, by=2e-4):
+    """Two arms that turn about (0, 40) mm, as the halves of a specimen do, with some motion of the whole."""
+    moved = []
+    for angle in (0.0, by):
+        side = np.sign(POINTS[:, 0])[:, None] * angle
+        arm = POINTS - [0.0, 40e-3]
+        moved.append(np.column_stack([-arm[:, 1], arm[:, 0]]) * side + [3e-6, -8e-6])
+    moved = np.array(moved) + np.random.default_rng(seed).normal(0, noise, (2, len(POINTS), 2))
+    ok = np.ones((2, len(POINTS)), bool)
+    return DisplacementField(POINTS, moved, ok, np.full(ok.shape, noise), np.arange(2.0))
+
+
+ARMS = POINTS[:, 0] < -1e-3, POINTS[:, 0] > 1e-3
+FAR_FEET = np.array([-2e-3, -30e-3]), np.array([2e-3, -30e-3])
+
+
+def test_a_gauge_out_of_sight_is_carried_by_the_arms():
+    seen, _ = rigid_opening(turned(), *FAR_FEET, ARMS, 0.0)
+    np.testing.assert_allclose(seen, [0, 2 * 2e-4 * 70e-3], atol=1e-15)  # both turn, 70 mm from the hinge
+
+
+def test_the_deviation_of_a_carried_gauge_is_its_scatter():
+    draws = np.array([rigid_opening(turned(1e-6, seed), *FAR_FEET, ARMS, 0.0)[0] for seed in range(200)])
+    stated = rigid_opening(turned(1e-6), *FAR_FEET, ARMS, 0.0)[1]
+    np.testing.assert_allclose(draws.std(axis=0), stated, rtol=0.2)  # four deviations of a deviation of 200
+
+
+def test_an_arm_without_points_has_no_opening():
+    field = turned()
+    none = replace(field, valid=field.valid & (POINTS[:, 0] > 0))
+    assert np.isnan(rigid_opening(none, *FAR_FEET, ARMS, 0.0)[0]).all()
 
 
 def test_a_foot_off_the_picture_is_refused():

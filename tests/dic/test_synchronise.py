@@ -42,6 +42,22 @@ def test_a_clip_gauge_with_another_gain():
     assert found.gain == pytest.approx(1.2, abs=0.01)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_part_that_follows_the_load(seed):
+    """Arms that bend under the load: without that part in the fit the clock would be seconds off."""
+    plain = record()
+    load = 3e3 * (plain.cmod / 5e-5) * np.exp(1 - plain.cmod / 5e-5)
+    curve = LoadCurve(plain.time, plain.cmod, load)
+    time, seen = frames(1.2, 0.4e-6, seed, gain=1.1)
+    seen = seen - 12e-6 * np.interp(time - 1.2, curve.time, load / load.max())
+    found = synchronise(time, seen, curve, fit_gain=True, fit_bending=True)
+    assert found.offset == pytest.approx(1.2, abs=5 * found.std)  # five deviations
+    assert found.std < 0.1
+    assert found.gain == pytest.approx(1.1, abs=0.01)
+    wrong = synchronise(time, seen, curve, fit_gain=True)
+    assert abs(wrong.offset - 1.2) > 5 * found.std
+
+
 def test_a_bare_ramp_cannot_be_synchronised():
     time = np.arange(0, 60, 0.05)
     ramp = LoadCurve(time, 1e-5 * time, np.ones_like(time))
