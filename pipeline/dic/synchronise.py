@@ -22,7 +22,7 @@ class Synchronisation:
     gain : float; opening seen by the camera over opening in the record
     zero : float, m; opening seen by the camera when the record shows none
     rms : float, m; of what is left
-    frames : int; how many frames overlap with the record
+    frames : int; how many frames were compared
     """
 
     offset: float
@@ -45,7 +45,8 @@ def synchronise(
     """Shift the frames until the opening they show lies on the record's CMOD.
 
     The opening seen is modelled as gain × CMOD(t − offset) + bending × load(t − offset) + zero and fitted by least
-    squares; a ramp alone cannot tell an offset from a zero, so first motion or a change of rate must be in both. The
+    squares; a ramp alone cannot tell an offset from a zero, so first motion or a change of rate must be in both (a
+    record that begins with the motion will do: before it the specimen is taken to be at rest). The
     error comes from the curvature of the sum of squares, with what is left taken as correlated over neighbouring
     frames.
 
@@ -113,10 +114,11 @@ class _Fit:
 
     def at(self, offset: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, tuple[float, float]]:
         """Mean square, what is left, d(opening)/d(offset), what else is fitted, (gain, zero); infinite where fewer
-        than half of the frames overlap with the record."""
+        than eight frames fall into the record or more than half behind it."""
         record, at = self.record, self.time - offset
-        used = (at >= record.time[0]) & (at <= record.time[-1])
-        if used.sum() < max(8, 0.5 * self.time.size):
+        used = at <= record.time[-1]  # before the record begins the specimen rests, and shows what it showed at first
+        overlap = used & (at >= record.time[0])
+        if overlap.sum() < 8 or used.sum() < 0.5 * self.time.size:
             return np.inf, np.zeros(0), np.zeros(0), np.zeros((0, 1)), (1.0, 0.0)
         cmod, cmod_rate = self._read(record.cmod, at[used])
         load, load_rate = self._read(record.load / np.abs(record.load).max(), at[used])

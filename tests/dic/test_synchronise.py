@@ -74,6 +74,16 @@ def test_clocks_that_do_not_overlap_are_refused():
         synchronise(time[:5], seen[:5], record())
 
 
+@pytest.mark.parametrize("late", [-2.0, 0.6])
+def test_a_record_whose_waiting_time_was_cut_off(late):
+    whole = record()
+    moving = whole.time >= 5.0
+    curve = LoadCurve(*(values[moving] for values in (whole.time, whole.cmod, whole.load)))
+    found = synchronise(*frames(late, 0.4e-6, 3), curve)
+    assert found.offset == pytest.approx(late, abs=5 * found.std)  # five deviations
+    assert found.std < 0.05
+
+
 def test_missing_frames_do_not_matter():
     time, seen = frames(0.73, 0.4e-6, 1)
     seen[::3] = np.nan
