@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from helpers.bundles import edit
+from helpers.commands import end_group, start, wait_for
 from helpers.films import MM_PER_PX, STEP_PX, make_film
 from scipy.spatial import cKDTree
 from typer.testing import CliRunner, Result
@@ -209,6 +211,28 @@ def test_a_stopped_run_goes_on_where_it_stopped(film, measured, tmp_path):
     again, whole = read_fields(out / "fields.h5"), read_fields(measured / "fields.h5")
     np.testing.assert_array_equal(again.valid, whole.valid)
     np.testing.assert_array_equal(again.displacement, whole.displacement)  # to the last bit: as kept, so gone on from
+
+
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
+def test_a_stopped_process_leaves_whole_frames(film, measured, tmp_path, how, code):
+    out = tmp_path / "out"
+    process = start("dic", film, "-o", out, "--workers", "1", scratch=tmp_path / "scratch")
+    try:
+        wait_for(lambda: len(list(out.glob("frames/0*.h5"))) >= 3)
+        process.send_signal(how)
+        told = process.communicate(timeout=60)[1]
+    finally:
+        end_group(process)
+    assert process.returncode == code
+    assert how == signal.SIGKILL or "give the same command again" in told
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("frames/0*.h5")}
+    assert not (out / "result.json").exists()
+    done = run("dic", film, "-o", out, "--workers", "1")
+    assert done.exit_code == 0, done.stderr
+    assert f"{len(kept)} of 28 images are kept" in done.stderr
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    again, whole = read_fields(out / "fields.h5"), read_fields(measured / "fields.h5")
+    np.testing.assert_array_equal(again.displacement, whole.displacement)  # to the last bit
 
 
 def test_images_identify_as_the_exact_fields_do(film, measured, both, tmp_path):
