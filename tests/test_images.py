@@ -344,6 +344,21 @@ def test_impossible_settings_are_wrong_usage(film, tmp_path, option):
     assert run("dic", film, "-o", tmp_path / "out", *option).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        (("--images", "--noise-px", "0.02"), "--noise-px belongs to displacement fields"),
+        (("--noise-grey", "3"), "--noise-grey belongs to speckle images: add --images"),
+        (("--camera-mm-per-px", "0.1"), "--camera-mm-per-px belongs to speckle images"),
+    ],
+)
+def test_noise_of_the_other_kind_is_refused(tmp_path, line, told):
+    done = run("virtual-test", tmp_path / "made", *line)
+    assert done.exit_code == 1
+    assert told in done.stderr
+    assert not (tmp_path / "made").exists()
+
+
 def test_a_region_beyond_the_picture_is_refused(film, tmp_path):
     bundle = shutil.copytree(film, tmp_path / "film")
     edit(bundle, roi_px="[0, 0, 5000, 100]")

@@ -114,7 +114,8 @@ def _finished(folder: Path, key: str) -> dict[str, Any] | None:
     """What result.json says, where it and the files beside it are whole and of these images."""
     with contextlib.suppress(MissingFileError, StoreError):
         result = read_result(folder)
-        if result.get("key") == key and not field_problems(folder / FIELDS):
+        drawn = (folder / "report.html").is_file()
+        if result.get("key") == key and drawn and not field_problems(folder / FIELDS):
             read_arrays(folder, DIC)
             return result
     return None
