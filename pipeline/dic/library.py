@@ -16,7 +16,7 @@ from numpy.ctypeslib import ndpointer
 
 from pipeline.core.errors import InputError
 
-VERSION = 2  # DIC_INTERFACE
+VERSION = 3  # DIC_INTERFACE
 _TEXT = 256  # DIC_TEXT
 _ERRORS: dict[int, type[Exception]] = {1: InputError, 2: MemoryError}
 
@@ -30,7 +30,7 @@ MATCHED = np.dtype(
 )
 PARTED = np.dtype(
     [
-        *(("near", "f8", 6), ("far", "f8", 6), ("line", "f8", 2), ("cost", "f8", 3)),
+        *(("near", "f8", 6), ("far", "f8", 6), ("line", "f8", 2), ("margin", "f8"), ("cost", "f8", 3)),
         *(("near_fit", "f8", 5), ("far_fit", "f8", 5), ("near_covariance", "f8", 36), ("far_covariance", "f8", 36)),
         *(("attempted", "i4"), ("far_matched", "i4"), ("count", "i4", 2), ("iterations", "i4")),
     ],

@@ -25,6 +25,7 @@ _BENT = 0.75  # share of the saving from which second-order terms explain it; th
 _SIDE = 25.0  # χ² by which the centre's side must be preferred
 _CLOSE_PX = 1.0  # nearer to the centre than this a line is not located by its pixels, which the gap has blurred …
 _CLOSE_SIDE = 200.0  # … unless χ² speaks so clearly
+_WIDE_PX = 3.0  # a wider band beside the line that matches neither side may be a strip of its own
 _HARMLESS_PX = 0.05  # a jump so small may be put on the wrong side
 
 
@@ -220,6 +221,7 @@ def _judge(sheet: Sheet, noise: MatchNoise, points: np.ndarray, found: dict[str,
     one_piece = (found["near_fit"][:, 4] <= noise.refused) & ~(far & (found["far_fit"][:, 4] > noise.refused))
     preferred = (swapped - parted) / noise.score
     told = (preferred > _SIDE) & ((found["line"][:, 1] > _CLOSE_PX) | (preferred > _CLOSE_SIDE))
+    told &= ~((found["margin"] > _WIDE_PX) & (found["margin"] > found["line"][:, 1]))
     told |= far & (np.linalg.norm(jump, axis=1) < _HARMLESS_PX)
     straight = sheet.variance[points] - sheet.bend[points] / np.maximum(sheet.count[points] - PARAMETERS, 1)
     whole = ~saves & (straight <= noise.limit(sheet.count[points]))

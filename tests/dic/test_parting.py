@@ -82,7 +82,7 @@ def test_cracks_drawn_at_random(seed, one_core):
     assert found.valid[1] > 0.9 * found.points[1]
 
 
-@pytest.mark.parametrize("distance", [8, 12])
+@pytest.mark.parametrize("distance", [4, 6, 8, 12])
 def test_two_cracks_in_one_subset_are_failed_not_wrong(distance, one_core):
     pair = two_cracks(distance, 3.0, 220)
     result = correlate(pair.reference, pair.deformed, one_core)

@@ -108,7 +108,7 @@ void unpack(const Fit &fit, double score, double *warp, double *numbers, double 
 void unpack(const SplitResult &r, dic_parted &out) {
   unpack(r.near, r.near_second.score, out.near, out.near_fit, out.near_covariance);
   unpack(r.far, r.far_second.score, out.far, out.far_fit, out.far_covariance);
-  out.line[0] = r.line.angle, out.line[1] = r.line.offset;
+  out.line[0] = r.line.angle, out.line[1] = r.line.offset, out.margin = r.margin;
   out.cost[0] = r.single, out.cost[1] = r.parted, out.cost[2] = r.swapped;
   out.attempted = r.attempted, out.far_matched = r.far_matched;
   out.count[0] = r.near_count, out.count[1] = r.far_count, out.iterations = r.near.iterations;

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define DIC_INTERFACE 2 /* counts up whenever something below changes */
+#define DIC_INTERFACE 3 /* counts up whenever something below changes */
 #define DIC_TEXT 256    /* bytes of every `text` */
 #define DIC_API __attribute__((visibility("default")))
 
@@ -36,7 +36,7 @@ typedef struct {
 
 /* A subset cut by a line. */
 typedef struct {
-  double near[6], far[6], line[2], cost[3]; /* cost: single, parted, swapped */
+  double near[6], far[6], line[2], margin, cost[3]; /* cost: single, parted, swapped */
   double near_fit[5], far_fit[5];                     /* zncc, residual, gain, offset, score */
   double near_covariance[36], far_covariance[36];
   int32_t attempted, far_matched, count[2], iterations;

@@ -166,8 +166,9 @@ Candidate seen(const Fit &f) { return {f.warp, f.gain, f.offset}; }
 
 // As match_side(), but while the score test finds the rim of the gap in the part the margin is widened.
 bool match_clean(const Part &part, const Line &line, double sign, double margin, const Candidate &start, Fit &out,
-                 int &count, const Prior *prior, Suspicion &second) {
+                 int &count, const Prior *prior, Suspicion &second, double *used = nullptr) {
   for (int extra = 0; extra < 3; ++extra) {
+    if (used) *used = margin + extra;
     if (!match_side(part, line, sign, margin + extra, start, out, count, prior)) return false;
     second = screen(part.work.part, part.work.bench.error.data(), out, out.residual / std::max(count - 8, 1),
                     part.settings.half);
@@ -227,7 +228,7 @@ SplitResult split(const Picture &reference, const Picture &current, Point centre
   const Prior *beyond = agreed(candidates, cut.line, -1, variance, far_prior) ? &far_prior : nullptr;
   if (far_known)
     r.far_matched = match_clean(part, cut.line, -1, far_margin, far, r.far, r.far_count, beyond, r.far_second);
-  if (!match_clean(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known, r.near_second))
+  if (!match_clean(part, cut.line, 1, near_margin, near, r.near, r.near_count, near_known, r.near_second, &r.margin))
     r.attempted = false;
   return r;
 }

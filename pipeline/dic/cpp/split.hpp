@@ -21,6 +21,7 @@ struct SplitResult {
   Line line;
   Fit near, far;
   int near_count = 0, far_count = 0;
+  double margin = 0;         // px, of the band along the line that the near part leaves out
   bool far_matched = false;
   double single = 0;         // cost of the best single warp: Σ min(e²/σ², clip) over the subset
   double parted = 0;         // cost of the two warps on both sides of the line
