@@ -79,8 +79,9 @@ def test_levelling_lowers_what_separates_a_lattice_from_its_own_pictures(test_of
     plain, level = np.where(both, plain, np.nan), np.where(both, level, np.nan)
     assert both.mean() > 0.95
     stated = rms(np.concatenate([c.std[c.valid] for c in found]))
-    assert rms(level) < 1.3 * stated  # noise of one picture pair, and what 3 frames of a lattice's facets leave
-    assert rms(level) < 0.5 * rms(plain)  # measured: 0.0069 against 0.0238 px
+    # noise of a pair, and beside the crack where another speckle lets another cut be found
+    assert rms(level) < 1.8 * stated
+    assert rms(level) < 0.5 * rms(plain)  # measured: 0.008 against 0.024 px
     assert rms(level[0]) == pytest.approx(rms(plain[0]), rel=0.1)  # before anything parts there is nothing to level
 
 
