@@ -133,6 +133,15 @@ def test_the_build_asks_for_a_compiler(tmp_path, without_compiler):
     assert ADVICE in " ".join(result.stderr.split())
 
 
+def test_no_part_needs_the_headers_of_python():
+    """A bare machine with python3 and g++ has none."""
+    sources = [ROOT / "CMakeLists.txt", ROOT / "pyproject.toml", *ROOT.glob("pipeline/*/cpp/*")]
+    assert len(sources) > 10
+    for source in sources:
+        named = re.findall(r"Python\.h|Development|nanobind|pybind11|Python_add_library", source.read_text("utf-8"))
+        assert not named, f"{source}: {named}"
+
+
 def test_the_archive_holds_what_is_needed_and_nothing_compiled(archive):
     with tarfile.open(archive) as tar:
         names = {name.partition("/")[2] for name in tar.getnames()}
@@ -156,7 +165,8 @@ def test_the_installed_package_is_complete(installed):
         assert path.relative_to(ROOT) in places or Path("pipeline") / path.relative_to(ROOT) in places, path
     decks = {path.name for path in (ROOT / "lammps_inputs").iterdir()}
     assert {entry.name for entry in (files("pipeline") / "lammps_inputs").iterdir()} >= decks
-    assert (files("pipeline") / "lmp" / "cohesiveplugin.so").is_file()
+    for part in ("lmp/cohesiveplugin.so", "dic/libcorrelate.so"):
+        assert files("pipeline").joinpath(part).is_file(), part
 
 
 def test_the_installed_package_is_the_one_under_test(installed):
@@ -196,6 +206,8 @@ def test_installing_from_an_archive_in_a_path_with_spaces(archive, tmp_path):
     version = run(command, "--version", cwd=tmp_path)
     assert version.stdout.strip() == run(python, "-m", "pipeline", "--version", cwd=tmp_path).stdout.strip()
     assert version.returncode == 0, version.stderr
-    opened = "from pipeline.lmp.plugin import open_lammps; open_lammps().close()"
+    opened = (
+        "from pipeline.dic.core import core; core(); from pipeline.lmp.plugin import open_lammps; open_lammps().close()"
+    )
     result = run(python, "-c", opened, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
