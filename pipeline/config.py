@@ -68,6 +68,10 @@ class RunSettings(BaseModel):
         default=3, description="how often the grid may be moved when the optimum lies on its edge"
     )
     recentring_steps: Annotated[int, Field(ge=1, le=10)] = Field(default=2, description="grid lines by which it moves")
+    surrogate: Literal["objective", "data"] = Field(
+        default="objective",
+        description="what is interpolated over the grid: the objective, as in the paper, or every simulated number",
+    )
     refinement_count: Annotated[int, Field(ge=0, le=4)] = Field(
         default=1,
         description="how often the grid may be halved around an optimum that it does not resolve",

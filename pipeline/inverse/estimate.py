@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -13,8 +14,17 @@ from pipeline.inverse.newton import Minimum, minimise
 from pipeline.inverse.objective import Comparison, Objective, Rigid, compare, differences, left_out
 from pipeline.inverse.observations import Measured, Simulated
 from pipeline.inverse.resolution import data_minimum, resolves
+from pipeline.inverse.squares import SquaredDifference
 from pipeline.inverse.surrogate import LagrangeSurrogate, leave_one_out
 from pipeline.inverse.uncertainty import Fit, Uncertainty, curvature_certainty, uncertainty
+
+
+class Surrogate(StrEnum):
+    """What the multinomials run through."""
+
+    OBJECTIVE = "objective"  # Φ at the nodes: the paper
+    DATA = "data"  # the simulated data at the nodes, squared afterwards
+
 
 CERTAIN = 3.0  # curvature over its scatter; below it a warning is given
 
@@ -30,6 +40,7 @@ class Settings:
     rigid : Rigid
     discrepancy : Discrepancy
     confidence : float, between 0 and 1
+    surrogate : Surrogate
     """
 
     objective: Objective
@@ -37,6 +48,7 @@ class Settings:
     rigid: Rigid = Rigid.FIT
     discrepancy: Discrepancy = field(default_factory=Discrepancy)
     confidence: float = 0.95
+    surrogate: Surrogate = Surrogate.OBJECTIVE
 
     def __post_init__(self) -> None:
         if not 0 < self.confidence < 1:
@@ -58,7 +70,7 @@ class Estimate:
     data_objective : float; Φ at the optimum from the interpolated data instead of the interpolated Φ
     data_position : (2,) array, N and m; where that Φ has its own minimum
     resolved : bool; the optimum is accepted, and a finer grid would leave it where it is beside noise and discrepancy
-    minimum : Minimum of the surrogate
+    minimum : Minimum of what `settings.surrogate` names
     others : tuple of Minimum; further local minima inside the grid that are no worse by more than loo_error
     refused : str; why the optimum is not accepted, empty where it is
     uncertainty : Uncertainty, or None where the optimum is not accepted
@@ -135,7 +147,7 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     """The paper's inverse estimation on a grid of simulations that have already been run.
 
     Φ at the nodes (eq. 5), its Lagrange multinomial and Newton's method from every node (eq. 6), then the
-    checks and intervals of `uncertainty`.
+    checks and intervals of `uncertainty`. With `settings.surrogate = data` the multinomials run through the data.
 
     Parameters
     ----------
@@ -152,10 +164,13 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     comparison = compare(measured, simulated, settings.objective, settings.rigid)
     objective, features = differences(comparison, simulated)
     surrogate = LagrangeSurrogate(design.f_max, design.delta_max, objective)
-    best, *others = minimise(surrogate, np.array(design.nodes()))
+    interpolated = LagrangeSurrogate(design.f_max, design.delta_max, features)
+    by_data = settings.surrogate is Surrogate.DATA
+    function = SquaredDifference(interpolated, comparison.target) if by_data else surrogate
+    best, *others = minimise(function, np.array(design.nodes()))
     loo_error = float(np.sqrt(np.mean(leave_one_out(surrogate) ** 2)))
     displacement, load = (_interpolated(design, a) for a in (simulated.displacement, simulated.load))
-    fit = Fit(comparison, surrogate, LagrangeSurrogate(design.f_max, design.delta_max, features), load, best)
+    fit = Fit(comparison, surrogate, interpolated, load, best, by_data)
     data_objective = float(np.sum(fit.residual**2))
     data_position = data_minimum(fit)
     refused = refusal(best, float(objective.min()), data_objective, loo_error)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pipeline.inverse.discrepancy import Discrepancy
-from pipeline.inverse.newton import Minimum
+from pipeline.inverse.newton import Minimum, minimise
+from pipeline.inverse.squares import SquaredDifference
 from pipeline.inverse.uncertainty import Fit, uncertainty
 
 SHARE = 0.3  # of a standard deviation by which the two minima may differ: a tenth more variance
@@ -16,20 +16,9 @@ LEAST = 1e-3  # of the parameters themselves; finer than this nothing is asked f
 
 
 def data_minimum(fit: Fit) -> np.ndarray:
-    """Where the squared difference of measured and *interpolated* data is smallest near the optimum; (2,), N and m.
-
-    Data bend far less over the grid than their squares do, so that this minimum is nearer to the truth where the two
-    differ; it needs all data where the multinomial of Φ (Hill et al. 2017, eq. 6) needs one number a node.
-    """
-    low, size = fit.features.lower, fit.features.upper - fit.features.lower
-    start = np.clip((fit.minimum.position - low) / size, 0.0, 1.0)
-    found = least_squares(
-        lambda x: fit.features.value(low + size * x) - fit.comparison.target,
-        start,
-        jac=lambda x: fit.features.gradient(low + size * x).T * size,
-        bounds=(0.0, 1.0),
-    )
-    return low + size * found.x
+    """Where Φ of the interpolated data is smallest, from the optimum on; (2,), N and m."""
+    squares = SquaredDifference(fit.features, fit.comparison.target)
+    return minimise(squares, fit.minimum.position[None])[0].position
 
 
 def resolves(fit: Fit, data_position: np.ndarray, discrepancy: Discrepancy) -> bool:

@@ -171,10 +171,22 @@ def node_scatter(surrogate: LagrangeSurrogate) -> tuple[float, int]:
     ----------
     surrogate : LagrangeSurrogate of numbers, at least three lines either way
     """
-    coefficients = _orthonormal(surrogate.f_nodes).T @ surrogate.values @ _orthonormal(surrogate.d_nodes)
-    n_f, n_d = coefficients.shape
-    high = np.add.outer(np.arange(n_f) / (n_f - 1), np.arange(n_d) / (n_d - 1)) > 1 + 1e-9
-    return float(np.sqrt(np.mean(coefficients[high] ** 2))), int(high.sum())
+    variance, freedom = node_covariance(replace(surrogate, values=surrogate.values[..., None]))
+    return float(np.sqrt(variance[0, 0])), freedom
+
+
+def node_covariance(surrogate: LagrangeSurrogate) -> tuple[np.ndarray, int]:
+    """The same of several values a node together: covariance (k, k) of their scatter, and its degrees of freedom.
+
+    Parameters
+    ----------
+    surrogate : LagrangeSurrogate of (k,) arrays, at least three lines either way
+    """
+    f, d = _orthonormal(surrogate.f_nodes), _orthonormal(surrogate.d_nodes)
+    coefficients = np.einsum("pa,pqk,qb->abk", f, surrogate.values, d)
+    n_f, n_d = coefficients.shape[:2]
+    high = coefficients[np.add.outer(np.arange(n_f) / (n_f - 1), np.arange(n_d) / (n_d - 1)) > 1 + 1e-9]
+    return high.T @ high / len(high), len(high)
 
 
 def _orthonormal(nodes: np.ndarray) -> np.ndarray:

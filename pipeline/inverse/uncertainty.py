@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm, t
@@ -11,7 +11,7 @@ from pipeline.core.errors import InputError
 from pipeline.inverse.discrepancy import Discrepancy, Wave, waves
 from pipeline.inverse.newton import Minimum
 from pipeline.inverse.objective import Comparison, Objective
-from pipeline.inverse.surrogate import LagrangeSurrogate, node_scatter
+from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance, node_scatter
 
 Interval = tuple[float, float]
 
@@ -118,7 +118,8 @@ class Fit:
     surrogate : LagrangeSurrogate of Φ
     features : LagrangeSurrogate of the simulations' features
     load : LagrangeSurrogate of the simulated loads (n_f, n_d, s), or None
-    minimum : Minimum of the surrogate
+    minimum : Minimum of the surrogate, or of Φ of the interpolated features
+    by_data : bool; which of the two
     """
 
     comparison: Comparison
@@ -126,6 +127,7 @@ class Fit:
     features: LagrangeSurrogate
     load: LagrangeSurrogate | None
     minimum: Minimum
+    by_data: bool = False
 
     @property
     def slopes(self) -> np.ndarray:
@@ -181,6 +183,8 @@ def curvature_certainty(fit: Fit) -> float:
 
     Below about three the intervals rest on a curvature that is itself a matter of chance.
     """
+    if fit.by_data:
+        return np.inf  # its curvature is a sum of squared slopes: scatter adds to it, and is in the interval
     size = fit.surrogate.upper - fit.surrogate.lower
     curvature, axes = np.linalg.eigh(fit.minimum.hessian * np.outer(size, size))
     along = axes[:, 0] * size
@@ -238,9 +242,24 @@ def _modulus(fit: Fit, relative: float) -> Contribution:
 
 def _scatter(fit: Fit) -> Contribution:
     """Crack paths that change from node to node: every node scatters alone, and the optimum with them."""
+    if fit.by_data:
+        return _scatter_of_data(fit)
     std, freedom = node_scatter(fit.surrogate)
     slopes = fit.surrogate.of_nodes().gradient(fit.minimum.position).reshape(2, -1)
     moved = std * np.linalg.solve(fit.minimum.hessian, slopes)
     unit = " m²" if fit.comparison.objective is Objective.FIELDS else ""
     sentence = f"scatter of the simulations about the multinomial, {std:.2g}{unit} in the objective"
     return Contribution("scatter", sentence, moved @ moved.T, float(freedom))
+
+
+def _scatter_of_data(fit: Fit) -> Contribution:
+    """The same where the multinomials run through the data: what each node's scatter would move the optimum by."""
+    moves = replace(fit.features, values=fit.features.values @ fit.response.T)  # (n_f, n_d, 2), N and m
+    scatter, freedom = node_covariance(moves)
+    weights = fit.features.of_nodes().value(fit.minimum.position)
+    covariance = float(np.sum(weights**2)) * scatter
+    share = np.sqrt(np.diag(covariance)) / fit.minimum.position
+    sentence = (
+        f"scatter of the simulations about the multinomials, {share[0]:.2g} of f_max, {share[1]:.2g} of delta_max"
+    )
+    return Contribution("scatter", sentence, covariance, float(freedom))

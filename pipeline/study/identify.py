@@ -18,7 +18,7 @@ from pipeline.core.units import MM
 from pipeline.execution.progress import Progress, Silent
 from pipeline.execution.simulations import run_all
 from pipeline.inverse.design import Design
-from pipeline.inverse.estimate import Estimate, Settings, estimate
+from pipeline.inverse.estimate import Estimate, Settings, Surrogate, estimate
 from pipeline.inverse.objective import Objective, Rigid
 from pipeline.inverse.observations import Measured, Simulated
 from pipeline.store.bundle import Bundle, read_bundle
@@ -224,7 +224,8 @@ def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
     if aim is not Objective.LOAD:
         seen = campaign.seen(runs)
     simulated = Simulated.of(design, seen, loads)
-    how = Settings(aim, campaign.settings.modulus_std, Rigid(campaign.settings.rigid))
+    settings = campaign.settings
+    how = Settings(aim, settings.modulus_std, Rigid(settings.rigid), surrogate=Surrogate(settings.surrogate))
     return estimate(design, simulated, campaign.measured, how)
 
 
@@ -269,6 +270,7 @@ def identification_result(
         "correlation": doubt and doubt.correlation,
         "covariance": doubt and doubt.covariance,
         "objective": found.settings.objective,
+        "surrogate": found.settings.surrogate,
         "objective_min": found.minimum.value,
         "interior": found.interior,
         "accepted": found.accepted,

@@ -51,7 +51,15 @@ class Trial:
     seconds: float
 
 
-def twin_trial(folder: Path, seed: int, objective: str, progress: Progress | None = None, **how: Any) -> Trial:
+def twin_trial(
+    folder: Path,
+    seed: int,
+    objective: str,
+    progress: Progress | None = None,
+    *,
+    config: Path | None = None,
+    **how: Any,
+) -> Trial:
     """Make the virtual test of a seed, unless it is there, and identify it.
 
     Parameters
@@ -59,29 +67,37 @@ def twin_trial(folder: Path, seed: int, objective: str, progress: Progress | Non
     folder : where bundles and results are kept; a second call goes on from there
     seed : of section, network, truth and noise
     objective : as of `identify`
+    config : settings of `identify`
     how : radius_mm and others of `virtual_test`
     """
     bundle, out = folder / f"twin-{seed}", folder / f"identified-{seed}-{objective}"
     if not (bundle / "truth.json").is_file():
         virtual_test(bundle, seed=seed, progress=progress, **how)
-    return _identified(bundle, out, seed, objective, progress)
+    return _identified(bundle, out, seed, objective, config, progress)
 
 
 def same_lattice_trial(
-    folder: Path, seed: int, objective: str, progress: Progress | None = None, *, dense: bool = False, **how: Any
+    folder: Path,
+    seed: int,
+    objective: str,
+    progress: Progress | None = None,
+    *,
+    config: Path | None = None,
+    dense: bool = False,
+    **how: Any,
 ) -> Trial:
     """Identify a test that was broken on the identifying lattice itself: noise and interpolation are what remains.
 
     Parameters
     ----------
-    folder, seed, objective, how : as of `twin_trial`
+    folder, seed, objective, config, how : as of `twin_trial`
     dense : compare all measured points around the notch tip instead of the paper's sixteen
     """
     name = f"same-{seed}{'-dense' if dense else ''}"
     bundle, out = folder / name, folder / f"identified-{name}-{objective}"
     if not (bundle / "truth.json").is_file():
         same_lattice_test(bundle, seed, Request(**how), dense, progress or Silent())
-    return _identified(bundle, out, seed, objective, progress)
+    return _identified(bundle, out, seed, objective, config, progress)
 
 
 def same_lattice_test(out: Path, seed: int, request: Request, dense: bool, progress: Progress) -> None:
@@ -106,8 +122,10 @@ def same_lattice_test(out: Path, seed: int, request: Request, dense: bool, progr
     write_atomically(out / "truth.json", json.dumps(known).encode())
 
 
-def _identified(bundle: Path, out: Path, seed: int, objective: str, progress: Progress | None) -> Trial:
-    identify(bundle, out, objective=objective, progress=progress)
+def _identified(
+    bundle: Path, out: Path, seed: int, objective: str, config: Path | None, progress: Progress | None
+) -> Trial:
+    identify(bundle, out, objective=objective, config=config, progress=progress)
     return compare(f"seed {seed}", json.loads((bundle / "truth.json").read_text("utf-8")), read_result(out))
 
 
