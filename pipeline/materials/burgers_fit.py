@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from pipeline.core.errors import InputError
 from pipeline.core.units import GPA
 from pipeline.materials.burgers import Burgers
-from pipeline.materials.residuals import inflation
+from pipeline.materials.correlated_scatter import correlated_scatter
 from pipeline.materials.series_fit import creep_design, not_negative, refuse_data
 
 NAMES = ("d1", "d2", "eta1", "tau2")
@@ -33,16 +33,18 @@ class BurgersFit:
     time : (n,) array, s
     compliance : (n,) array, 1/Pa
     covariance : (4, 4) array; of the logarithms of d1, d2, eta1, tau2
-    degrees : int; n − 4
-    inflation : float; by which neighbouring residuals that go together enlarge the variances
+    inflation : (4,) array; by which correlated residuals enlarge the variances
+    degrees : float; of freedom behind them
+    correlation : float; of neighbouring residuals
     """
 
     model: Burgers
     time: np.ndarray
     compliance: np.ndarray
     covariance: np.ndarray
-    degrees: int
-    inflation: float
+    inflation: np.ndarray
+    degrees: float
+    correlation: float
 
     @cached_property
     def interval(self) -> dict[str, tuple[float, float]]:
@@ -52,13 +54,19 @@ class BurgersFit:
         squares below S_min (1 + c t²/(n − 4)), t Student's 95 % point and c the inflation by correlated
         residuals; so a constant that the record does not show is unbounded on that side, not precise by accident.
         """
-        squares = float(self.residual @ self.residual)
-        allowed = 1 + self.inflation * student.ppf((1 + CONFIDENCE) / 2, self.degrees) ** 2 / self.degrees
-        bounds = _bounds(self.time, self.compliance)
-        limit = max(squares * allowed, squares + 1e-24 * self.time.size)
-        profile = _Profile(self.time, self.compliance, *bounds, _logs(self.model), limit)
+        squares, count = float(self.residual @ self.residual), self.time.size
+        bounds, best = _bounds(self.time, self.compliance), _logs(self.model)
         std = np.sqrt(np.diag(self.covariance))
-        return {name: profile.interval(k, float(std[k])) for k, name in enumerate(NAMES)}
+        found = {}
+        for k, name in enumerate(NAMES):
+            allowed = 1 + self.inflation[k] * self._student**2 / (count - 4)
+            limit = max(squares * allowed, squares + 1e-24 * count)
+            found[name] = _Profile(self.time, self.compliance, *bounds, best, limit).interval(k, float(std[k]))
+        return found
+
+    @property
+    def _student(self) -> float:
+        return float(student.ppf((1 + CONFIDENCE) / 2, self.degrees))
 
     @cached_property
     def residual(self) -> np.ndarray:
@@ -81,9 +89,7 @@ class BurgersFit:
         step = 1e-5
         theta = _logs(self.model)
         slope = np.array([np.log(value(_model(theta + step * e))) - centre for e in np.eye(4)]) / step
-        half = student.ppf((1 + CONFIDENCE) / 2, self.degrees) * np.sqrt(
-            np.einsum("in,ij,jn->n", slope, self.covariance, slope)
-        )
+        half = self._student * np.sqrt(np.einsum("in,ij,jn->n", slope, self.covariance, slope))
         return np.exp(centre - half), np.exp(centre + half)
 
 
@@ -106,11 +112,14 @@ def fit_burgers(time: np.ndarray, compliance: np.ndarray) -> BurgersFit:
     _refuse_poor(time, compliance)
     low, high = _bounds(time, compliance)
     best = min((_refined(time, compliance, s, low, high) for s in _starts(time, compliance)), key=lambda r: r.cost)
-    theta, degrees = best.x, time.size - 4
-    factor = inflation(best.fun, time)
-    at_bound = (theta <= low + 1e-6) | (theta >= high - 1e-6)
-    covariance = _covariance(best.jac, best.fun, at_bound, factor, degrees)
-    return BurgersFit(_model(theta), time, compliance, covariance, degrees, factor)
+    free = (best.x > low + 1e-6) & (best.x < high - 1e-6)  # constants at a bound are taken as known
+    scatter = correlated_scatter(best.fun, best.jac[:, free], time)
+    covariance, inflation = np.zeros((4, 4)), np.ones(4)
+    covariance[np.ix_(free, free)] = scatter.covariance
+    own = np.diag(scatter.independent)
+    inflation[free] = np.divide(np.diag(scatter.covariance), own, out=np.ones_like(own), where=own > 0)
+    inflation[~free] = inflation[free].max(initial=1.0)
+    return BurgersFit(_model(best.x), time, compliance, covariance, inflation, scatter.degrees, scatter.correlation)
 
 
 @dataclass(frozen=True)
@@ -207,17 +216,6 @@ def _bounds(time: np.ndarray, compliance: np.ndarray) -> tuple[np.ndarray, np.nd
     low = [1e-4 * least, 1e-4 * least, 0.1 * first / most, 0.1 * first]
     high = [2 * most, 1e3 * most, 1e4 * last / least, 100 * last]
     return np.log(low), np.log(high)
-
-
-def _covariance(
-    slope: np.ndarray, residual: np.ndarray, at_bound: np.ndarray, factor: float, degrees: int
-) -> np.ndarray:
-    """c s² (JᵀJ)⁻¹ of the logarithms (4, 4); constants at a bound are taken as known."""
-    free = ~at_bound
-    covariance = np.zeros((4, 4))
-    inverse = np.linalg.pinv(slope[:, free].T @ slope[:, free], rcond=1e-14)
-    covariance[np.ix_(free, free)] = factor * float(residual @ residual) / degrees * inverse
-    return covariance
 
 
 def _model(theta: np.ndarray) -> Burgers:

@@ -81,7 +81,7 @@ def creep_result(found: CreepAnalysis, file: str, told: tuple[str, ...], seconds
         "relaxation": _terms(model.relaxation()),
         "rms_log_error": found.fit.rms_log_error,
         "window_s": found.window,
-        "residual_inflation": found.fit.inflation,
+        "residual_correlation": found.fit.correlation,
         "prony": {
             "creep": {
                 "instantaneous_per_gpa": found.chain.instantaneous * GPA,
