@@ -8,7 +8,7 @@ is made, also from records or tables with a negative term.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
 from pipeline.core.errors import InputError
 from pipeline.materials.kelvin_chain import KelvinChain
@@ -106,8 +106,11 @@ def not_negative(design: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """
     length = np.linalg.norm(design, axis=0)
     length[length == 0] = 1.0
-    size, _ = nnls(design / length, wanted, maxiter=100 * design.shape[1])
-    return size / length
+    try:
+        size, _ = nnls(design / length, wanted, maxiter=100 * design.shape[1])
+    except RuntimeError:  # it goes in circles where columns can hardly be told apart
+        size = lsq_linear(design / length, wanted, (0, np.inf), method="bvls").x
+    return np.maximum(size, 0.0) / length
 
 
 def refuse_data(

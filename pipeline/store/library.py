@@ -187,7 +187,10 @@ class Library:
         except OSError as error:
             raise refused(self.path, error) from error
         try:
-            fcntl.flock(folder, fcntl.LOCK_EX)
+            try:
+                fcntl.flock(folder, fcntl.LOCK_EX)
+            except OSError as error:  # a file system without locks
+                raise refused(self.path, error) from error
             yield
         finally:
             os.close(folder)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.errors import InputError
+from pipeline.materials import series_fit
 from pipeline.materials.burgers import Burgers
 from pipeline.materials.interconversion import relaxation_of
 from pipeline.materials.prony import PronySeries
@@ -78,6 +79,19 @@ def test_positive_sets_of_the_literature_are_found_again(shared_data, name):
     frequency = 1 / at
     again = fit_dynamic(frequency, truth.complex_modulus(frequency), truth.time)
     assert again.modulus == pytest.approx(truth.modulus, rel=1e-6)  # likewise
+
+
+def test_where_one_solver_goes_in_circles_the_other_finds_the_same(monkeypatch):
+    design = np.column_stack([np.ones_like(TIME), TIME, np.exp(-TIME / 30)])
+    wanted = 1 + 0.5 * np.exp(-TIME / 30) - 1e-4 * TIME
+    usual = series_fit.not_negative(design, wanted)
+
+    def circles(*args: object, **options: object) -> None:
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr(series_fit, "nnls", circles)
+    assert series_fit.not_negative(design, wanted) == pytest.approx(usual, rel=1e-6, abs=1e-9)  # stop of the solver
+    assert usual[1] == 0  # the bound holds
 
 
 def test_refuses_what_cannot_be_fitted():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -146,6 +147,15 @@ def test_a_failed_write_leaves_the_library_as_it_was(library, monkeypatch):
     with pytest.raises(StoreError, match="the disk is full"):
         library.add(numbered(2))
     assert library.path.read_bytes() == before
+
+
+def test_a_file_system_without_locks_is_said_to_be_one(library, monkeypatch):
+    def none(*args: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(module.fcntl, "flock", none)
+    with pytest.raises(StoreError, match=r"mixtures\.h5 cannot be written: No locks available"):
+        library.add(ENTRY)
 
 
 def _add_many(path: Path, first: int, count: int) -> None:
