@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,19 @@ def test_park_1999_through_the_whole_command(tmp_path, shared_data):
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["warnings"]  # five decades are too many for one retardation time
     assert "narrow the window" in result["warnings"][-1]
+
+
+def test_the_example_is_what_its_script_writes_and_is_understood(tmp_path, monkeypatch):
+    root = Path(__file__).resolve().parents[2]
+    shipped = root / "pipeline" / "examples" / "creep" / "isotherms.csv"
+    monkeypatch.setattr("sys.argv", ["make_creep_example.py", str(tmp_path / "isotherms.csv")])
+    made = runpy.run_path(str(root / "scripts" / "make_creep_example.py"), run_name="__main__")
+    assert (tmp_path / "isotherms.csv").read_bytes() == shipped.read_bytes()
+    run("creep", shipped, "-o", tmp_path / "out", "--temperature-c", -12, "--times", "1,200")
+    laws = json.loads((tmp_path / "out" / "result.json").read_text())["shift_laws"]["wlf"]
+    for key, truth in (("c1", made["LAW"].c1), ("c2_k", made["LAW"].c2)):
+        low, high = laws["interval_95"][key]
+        assert low < truth < high
 
 
 def test_the_window_chooses_what_burgers_is_fitted_to(tmp_path):
