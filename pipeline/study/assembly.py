@@ -13,6 +13,7 @@ from pipeline.config import RunSettings, load_settings, run_settings
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Problem
+from pipeline.core.units import GPA
 from pipeline.materials.elastic import central_force_stiffness
 from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.attachment import attach_gauge, attach_grips, gauge_remark
@@ -20,9 +21,11 @@ from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
 from pipeline.microstructure.phases import PackingReport, lay_phases
 from pipeline.microstructure.segment import segment
+from pipeline.store import creep
 from pipeline.store.bundle import Bundle
 from pipeline.store.images import read_grey, read_labels
 from pipeline.store.start import start_parameters
+from pipeline.study.creep_analysis import mastic_creep
 
 PRE_PEAK = (0.25, 0.5, 0.75)  # of the CMOD at peak: frames kept for the diagnosis
 
@@ -113,6 +116,9 @@ def build_model(bundle: Bundle, radius: float | None = None) -> Model:
     packing = hexagonal_packing(bundle.specimen, radius or bundle.model.radius, bundle.model.lattice_angle)
     particles, bonds, report = lay_phases(bundle.specimen, packing, phase_map)
     remark = gauge_remark(bundle.specimen, particles)
+    material = mixture(bundle, radius)
+    if bundle.material.mastic_modulus is None:
+        remarks += (f"modulus of the mastic {material.mastic_modulus / GPA:.4g} GPa, 1/D₁ of {creep.FILE}",)
     if report.islands or report.loose:
         remarks += (f"{report.islands + report.loose} particles did not hold to the specimen and were left out",)
     return Model(
@@ -122,7 +128,7 @@ def build_model(bundle: Bundle, radius: float | None = None) -> Model:
         bonds=bonds,
         grips=attach_grips(bundle.specimen, particles),
         gauge=attach_gauge(bundle.specimen, particles),
-        mixture=mixture(bundle, radius),
+        mixture=material,
         report=report,
         remarks=remarks + ((remark,) if remark else ()),
     )
@@ -163,9 +169,7 @@ def mixture(bundle: Bundle, radius: float | None = None) -> Mixture:
     """The material of a bundle for particles of a radius (m), in SI."""
     material = bundle.material
     f_max, delta_max = start_parameters(bundle, radius)
-    modulus = material.mastic_modulus
-    if modulus is None:
-        raise InputError("experiment.toml: [material] mastic_modulus_gpa is missing: give it")
+    modulus = material.mastic_modulus or 1 / mastic_creep(bundle).burgers.d1  # as the paper's elastic model has it
     return Mixture(
         mastic_modulus=modulus,
         aggregate_modulus=material.aggregate_modulus or modulus,

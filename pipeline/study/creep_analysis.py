@@ -15,7 +15,8 @@ from pipeline.materials.master_curve import MasterCurve, creep_master_curve
 from pipeline.materials.prony import PronySeries
 from pipeline.materials.series_fit import fit_creep, spaced_times
 from pipeline.materials.shift_laws import Arrhenius, ShiftLaw, Wlf, fit_arrhenius, fit_wlf
-from pipeline.store.creep import CreepRecord
+from pipeline.store.bundle import Bundle
+from pipeline.store.creep import FILE, CreepRecord
 
 KELVIN = 273.15
 POOR_FIT = 0.05  # rms of ln D; a laboratory reads better than this
@@ -92,6 +93,29 @@ def analyse_creep(
     chain = fit_creep(time, record.compliance, spaced_times(time.min(), time.max()))
     warnings += _doubts(fit, master)
     return CreepAnalysis(record, target, time, window, fit, chain, relaxation_of(chain), master, laws, tuple(warnings))
+
+
+def mastic_creep(bundle: Bundle) -> CreepAnalysis:
+    """What creep.csv of a bundle says of its mastic at the temperature of the test.
+
+    A record that names no temperature is taken as measured at that of the test.
+
+    Raises
+    ------
+    InputError
+        where there is no record, it does not reach the temperature, or that is not stated
+    """
+    record, wanted = bundle.creep, bundle.loading.temperature_c
+    if record is None:
+        raise InputError(f"{bundle.name} has no {FILE}: add the creep compliance of the mastic")
+    if record.temperature_c is None:
+        wanted = None
+    elif wanted is None and np.unique(record.temperature_c).size > 1:
+        raise InputError(f"experiment.toml: [loading] temperature_c is missing: {FILE} holds several temperatures")
+    try:
+        return analyse_creep(record, wanted)
+    except InputError as error:
+        raise InputError(f"{FILE}: {error}") from error
 
 
 def _target(levels: np.ndarray | None, wanted: float | None) -> float | None:

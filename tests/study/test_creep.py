@@ -17,9 +17,12 @@ from pipeline.materials.burgers import Burgers
 from pipeline.materials.kelvin_chain import KelvinChain
 from pipeline.materials.prony import PronySeries
 from pipeline.materials.shift_laws import Wlf
+from pipeline.store.bundle import read_bundle
 from pipeline.store.creep import CreepRecord, read_creep
 from pipeline.store.layouts import CREEP
+from pipeline.store.new import Contents, first_experiment, write_bundle
 from pipeline.store.results import read_arrays
+from pipeline.study.assembly import build_model
 from pipeline.study.creep_analysis import analyse_creep
 
 READINGS = np.array([1, 2, 5, 10, 20, 50, 100, 200, 500, 1000.0])  # s, AASHTO T 322
@@ -236,3 +239,29 @@ def keys(value: object) -> set[str]:
     if isinstance(value, dict):
         return set(value) | set[str]().union(*(keys(item) for item in value.values()))
     return set[str]().union(*(keys(item) for item in value)) if isinstance(value, list) else set()
+
+
+def creeping_bundle(folder: Path, creep: str, temperature: str = "-12.0") -> Path:
+    """A bundle that states no modulus of the mastic, but how it creeps."""
+    write_bundle(folder, first_experiment("seb", folder.name), Contents())
+    text = (folder / "experiment.toml").read_text()
+    text = re.sub(r"^mastic_modulus_gpa.*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^#? ?temperature_c.*$", f"temperature_c = {temperature}", text, flags=re.MULTILINE)
+    text = re.sub(r"^particle_radius_mm.*$", "particle_radius_mm = 2.0", text, flags=re.MULTILINE)
+    (folder / "experiment.toml").write_text(text)
+    (folder / "creep.csv").write_text(creep)
+    return folder
+
+
+def test_a_bundle_without_modulus_takes_that_of_its_creep_record(tmp_path):
+    record = one_temperature(tmp_path).read_text()
+    model = build_model(read_bundle(creeping_bundle(tmp_path / "b", record)))
+    assert model.mixture.mastic_modulus == pytest.approx(1 / MASTIC.d1, rel=1e-6)  # nine digits are written
+    assert "modulus of the mastic 10 GPa, 1/D₁ of creep.csv" in model.remarks
+
+
+def test_a_record_that_misses_the_temperature_of_the_test_is_refused(tmp_path):
+    record = one_temperature(tmp_path).read_text()
+    bundle = read_bundle(creeping_bundle(tmp_path / "b", record, temperature="-20.0"))
+    with pytest.raises(InputError, match=r"creep\.csv: -20 °C lies outside the record, only -12 °C"):
+        build_model(bundle)
