@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.core.errors import ConvergenceError
 from pipeline.dic.core import core
 from pipeline.dic.correlation import Correlation
+from pipeline.dic.grey import checked
 from pipeline.dic.grid import Grid
 from pipeline.dic.noise import MatchNoise, deviation
 from pipeline.dic.parting import Match, Sheet, adopt, part
@@ -17,8 +18,6 @@ from pipeline.dic.seeds import find
 from pipeline.dic.settings import Settings
 from pipeline.dic.status import Status
 
-_LEAST_SPAN, _MOST_SPAN = 1e-4, 1e12  # of the grey values: against the largest, and in all
-_LEAST_LEVELS = 8  # grey values; a photograph of 3 bits
 _OTHER_LIGHT = 0.12  # share of the region of interest that may be saturated in one picture only
 _ROUNDS = 4  # of seeding: parts that no neighbour reaches get seeds of their own
 _SEEDS = 9
@@ -27,50 +26,6 @@ _UNUSUAL = 3.0  # noisy pictures: points fail only when they scatter so many tim
 _OUTCOMES = np.array(
     [*(Status.OK, Status.NOT_CONVERGED, Status.OUTSIDE, Status.NO_CONTRAST, Status.NOT_CONVERGED, Status.SATURATED)]
 )
-
-
-def checked(image: np.ndarray, what: str, like: np.ndarray | None = None) -> np.ndarray:
-    """The grey values as float32, rows × columns.
-
-    Raises
-    ------
-    InputError
-        for anything but a finite picture with some contrast, at least 16 × 16 pixels and of the size of `like`
-    """
-    image = np.asarray(image)
-    if image.ndim != 2:
-        raise InputError(
-            f"{what} has {image.ndim} dimensions (shape {image.shape}), expected rows × columns of grey values"
-        )
-    if image.dtype.kind not in "uif":
-        raise InputError(f"{what} holds values of type {image.dtype}, expected whole or real grey values")
-    if min(image.shape) < 16:
-        raise InputError(f"{what} has {image.shape[1]} × {image.shape[0]} px, expected at least 16 × 16")
-    if not np.isfinite(image).all():
-        raise InputError(
-            f"{what} holds {int((~np.isfinite(image)).sum())} values that are not finite: fill or crop them"
-        )
-    if like is not None and image.shape != like.shape:
-        raise InputError(
-            f"{what} has {image.shape[1]} × {image.shape[0]} px, the reference {like.shape[1]} × {like.shape[0]}: "
-            "pictures of one test must have one size"
-        )
-    low, high = float(image.min()), float(image.max())
-    if low == high:
-        raise InputError(f"{what} is blank: every pixel has the grey value {low:g}")
-    if not _LEAST_SPAN * max(-low, high) < high - low < _MOST_SPAN:
-        raise InputError(
-            f"{what} has grey values from {low:.9g} to {high:.9g}, which single precision cannot hold: subtract what "
-            "they have in common and scale them to 16 bits"
-        )
-    if np.unique(image[:: max(1, image.shape[0] // 128), :: max(1, image.shape[1] // 128)]).size < _LEAST_LEVELS:
-        levels = np.unique(image).size
-        if levels < _LEAST_LEVELS:
-            raise InputError(
-                f"{what} has {levels} different grey values, which tell no displacement: use the photograph as the "
-                "camera took it"
-            )
-    return np.ascontiguousarray(image, np.float32)
 
 
 class Reference:

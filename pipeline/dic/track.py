@@ -16,8 +16,9 @@ from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.core.field import DisplacementField
 from pipeline.dic.camera import View
 from pipeline.dic.core import core
-from pipeline.dic.correlate import checked, matched
+from pipeline.dic.correlate import matched
 from pipeline.dic.correlation import Correlation
+from pipeline.dic.grey import checked
 from pipeline.dic.grid import Grid
 from pipeline.dic.parting import Match
 from pipeline.dic.settings import Settings

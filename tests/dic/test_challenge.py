@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from pipeline.dic.challenge import fatigue_crack, rigid_shift
+from pipeline.dic.challenge import rigid_shift
 from pipeline.dic.correlate import Reference, correlate
 from pipeline.dic.settings import Settings
 from pipeline.store.images import read_grey
@@ -96,8 +96,7 @@ def test_open_hole_composite_agrees_with_two_other_codes(frame, shared_data):
     assert np.all(np.sqrt(np.mean(off**2, axis=0)) < 0.012)  # README: DICe and OpenCorr differ by 0.004–0.0045
 
 
-def test_the_benchmark_meets_the_numbers_of_the_readmes(shared_data):
-    folders = (shared_data / "dic1_sample05", shared_data / "crackpy_dic_crack")
-    rows = [*rigid_shift(folders[0], read_grey), *fatigue_crack(folders[1])]
-    assert len(rows) == 4
+def test_the_benchmark_meets_the_numbers_of_a_readme(shared_data):
+    rows = list(rigid_shift(shared_data / "dic1_sample05", read_grey))
+    assert len(rows) == 2
     assert all(row.met for row in rows), "\n".join(map(str, rows))

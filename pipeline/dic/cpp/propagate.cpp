@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "parallel.hpp"
+#include "seen.hpp"
 
 namespace dic {
 namespace {

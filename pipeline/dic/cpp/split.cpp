@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "lanes.hpp"
+#include "seen.hpp"
 
 namespace dic {
 namespace {
