@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from pipeline.core.units import MM
 from pipeline.report.style import BLUE, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILION
@@ -29,6 +30,7 @@ def convergence(axes: Axes, steps: np.ndarray, error: Mapping[str, np.ndarray], 
     middle = np.exp(np.mean(np.log(first))) * (steps / np.exp(np.mean(np.log(steps)))) ** -order
     axes.loglog(steps, middle, "--", color=GREY, linewidth=0.9, label=f"order {order:.2g}")
     axes.set(xlabel="steps", ylabel="difference from equilibrium")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.legend(loc="lower left")
     return axes
 

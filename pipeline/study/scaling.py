@@ -50,3 +50,23 @@ def scaled_solution(solution: Solution, problem: Problem, factor: float) -> Solu
         energy=EnergyBalance(**{name: factor**2 * value for name, value in vars(energy).items()}),
         message=f"{solution.message}; scaled by {factor:g}",
     )
+
+
+def scaling_groups(nodes: list[tuple[float, float]]) -> list[list[tuple[int, float]]]:
+    """Nodes (f_max, delta_max) of a grid that one simulation would give, the largest of each group first.
+
+    Nodes whose delta_max/f_max is the same map on each other, if every strength and opening is scaled
+    (`aggregate_follows`, or no damage in the aggregate): the largest would have to be followed to a CMOD
+    larger by 1/factor.
+
+    Returns
+    -------
+    groups of (number of the node, factor to the first of its group)
+    """
+    ratios = np.array([delta / f for f, delta in nodes])
+    groups: dict[float, list[int]] = {}
+    for number, ratio in enumerate(ratios):
+        known = next((r for r in groups if np.isclose(r, ratio, rtol=1e-9, atol=0)), float(ratio))
+        groups.setdefault(known, []).append(number)
+    ordered = [sorted(group, key=lambda k: -nodes[k][0]) for group in groups.values()]
+    return [[(k, nodes[k][0] / nodes[group[0]][0]) for k in group] for group in ordered]

@@ -12,8 +12,9 @@ from pipeline.core.errors import InputError
 from pipeline.core.problem import Kinematics
 from pipeline.core.units import MM
 from pipeline.equilibrium.solve import solve
+from pipeline.inverse.design import Design
 from pipeline.study.closed_forms import LONG_BEAM, closed_form_checks, tada_cmod
-from pipeline.study.scaling import scaled_problem, scaled_solution
+from pipeline.study.scaling import scaled_problem, scaled_solution, scaling_groups
 
 
 def test_every_closed_form_holds() -> None:
@@ -44,3 +45,10 @@ def test_finite_kinematics_is_not_scaled() -> None:
     beam = replace(small_beam(2.8 * MM), kinematics=Kinematics.FINITE)
     with pytest.raises(InputError, match="small kinematics"):
         scaled_problem(beam, 2.0)
+
+
+def test_the_paper_s_grid_holds_four_nodes_twice() -> None:
+    groups = scaling_groups(Design((71.0, 1.14e-4)).nodes())
+    assert len(groups) == 21, "25 nodes, of which the diagonal is one test at five scales"
+    [diagonal] = [group for group in groups if len(group) > 1]
+    assert [factor for _, factor in diagonal] == pytest.approx([1, 1.1 / 1.2, 1 / 1.2, 0.9 / 1.2, 0.8 / 1.2])
