@@ -63,44 +63,62 @@ class Timing:
     opening: Opening | None = None
 
 
-def notch_opening(specimen: Specimen, series: Series, factor: float) -> Opening | None:
-    """The opening at the specimen's gauge in every frame; None where too little of the arms is in the pictures.
+@dataclass(frozen=True, eq=False)
+class NotchGauge:
+    """A clip gauge read off correlated frames.
 
     Parameters
     ----------
-    specimen : Specimen
     series : Series
-    factor : float; on the standard deviations
+    points : (n, 2) array, m; of the grid
+    feet : (2, 2) array, m; left and right
+    use : (n,) bool array; the points that carry the feet
+    arms : those of the left and the right arm, or None where points lie around the feet themselves
+    reach, edge : float, m; of a foot, and of a subset
     """
-    points = series.view.point(series.grid.points)
-    edge = series.settings.subset_size_px * series.view.metre_per_px
-    half = specimen.gauge_length / 2
-    feet = np.array([(-half, specimen.gauge_y), (half, specimen.gauge_y)])
-    reach = max(min(SUBSETS * edge, specimen.notch_length), half)
-    shown = all(_stands(points[series.ever], foot, reach) for foot in feet)
-    arms = _arms(points, series.ever, specimen, edge)
-    if not shown and arms is None:
-        return None
-    near = series.ever & (np.min([np.hypot(*(points - f).T) for f in feet], axis=0) <= reach)
-    use = near if shown or arms is None else arms[0] | arms[1]
-    value, std = np.zeros(len(series)), np.zeros(len(series))
-    for frame in series.frames():
-        field = _part(series, frame.result, points, use, factor)
-        if shown or arms is None:
-            (value[frame.number],), (std[frame.number],) = opening(field, feet[0], feet[1], reach, edge)
+
+    series: Series
+    points: np.ndarray
+    feet: np.ndarray
+    use: np.ndarray
+    arms: tuple[np.ndarray, np.ndarray] | None
+    reach: float
+    edge: float
+
+    @classmethod
+    def of(cls, specimen: Specimen, series: Series) -> NotchGauge | None:
+        """At the specimen's own gauge; None where too little of the flanks of its notch is in the pictures."""
+        points, half = series.view.point(series.grid.points), specimen.gauge_length / 2
+        edge = series.settings.subset_size_px * series.view.metre_per_px
+        feet = np.array([(-half, specimen.gauge_y), (half, specimen.gauge_y)])
+        reach = max(min(SUBSETS * edge, specimen.notch_length), half)
+        if all(_stands(points[series.ever], foot, reach) for foot in feet):
+            near = np.min([np.hypot(*(points - f).T) for f in feet], axis=0) <= reach
+            return cls(series, points, feet, series.ever & near, None, reach, edge)
+        arms = _arms(points, series.ever, specimen, edge)
+        return arms and cls(series, points, feet, arms[0] | arms[1], arms, reach, edge)
+
+    def opening(self, result: Correlation) -> tuple[float, float]:
+        """The opening in one frame and its standard deviation by camera noise, m."""
+        field = self._part(result)
+        if self.arms is None:
+            (value,), (std,) = opening(field, self.feet[0], self.feet[1], self.reach, self.edge)
         else:
-            sides = arms[0][use], arms[1][use]
-            (value[frame.number],), (std[frame.number],) = rigid_opening(field, feet[0], feet[1], sides, edge)
-    return Opening(value, std, shown)
+            sides = self.arms[0][self.use], self.arms[1][self.use]
+            (value,), (std,) = rigid_opening(field, self.feet[0], self.feet[1], sides, self.edge)
+        return float(value), float(std)
 
-
-def _part(series: Series, result: Correlation, points: np.ndarray, use: np.ndarray, factor: float) -> DisplacementField:
-    """Some points of one frame in specimen coordinates, m."""
-    moved = series.view.vector(np.nan_to_num(result.warp[use, :2]))
-    spread = factor * np.sqrt(np.mean(result.std[use] ** 2, axis=1)) * series.view.metre_per_px
-    return DisplacementField(
-        points[use], moved[None], result.valid[use][None], np.nan_to_num(spread)[None], np.zeros(1)
-    )
+    def _part(self, result: Correlation) -> DisplacementField:
+        """The points that carry the feet, in specimen coordinates, m."""
+        view, use = self.series.view, self.use
+        spread = np.sqrt(np.mean(result.std[use] ** 2, axis=1)) * view.metre_per_px
+        return DisplacementField(
+            self.points[use],
+            view.vector(np.nan_to_num(result.warp[use, :2]))[None],
+            result.valid[use][None],
+            np.nan_to_num(spread)[None],
+            np.zeros(1),
+        )
 
 
 def _stands(points: np.ndarray, foot: np.ndarray, reach: float) -> bool:

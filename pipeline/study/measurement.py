@@ -22,6 +22,7 @@ from pipeline.dic.correlation import Correlation
 from pipeline.dic.crack import Crack, find_crack
 from pipeline.dic.grid import Grid
 from pipeline.dic.settings import Settings
+from pipeline.dic.status import Status
 from pipeline.dic.track import Tracker
 from pipeline.execution.progress import Progress
 from pipeline.store.bundle import Bundle
@@ -29,7 +30,7 @@ from pipeline.store.correlations import Frame, FrameStore, as_kept, chained_keys
 from pipeline.store.fields import stream_fields
 from pipeline.store.images import read_grey
 from pipeline.store.results import prepare_output
-from pipeline.study.gauge import Timing, notch_opening, synchronised
+from pipeline.study.gauge import NotchGauge, Opening, Timing, synchronised
 from pipeline.study.photography import view_of
 
 FRAMES = "frames"
@@ -76,8 +77,8 @@ class Series:
     def ever(self) -> np.ndarray:
         """(n,) bool; points that have a result in any frame: the others lie beside the specimen."""
         found = np.zeros(self.grid.size, bool)
-        for frame in self.frames():
-            found |= frame.result.valid
+        for number, key in enumerate(self.keys[1:], start=1):
+            found |= self.store.status(number, key) <= Status.SPLIT
         return found
 
 
@@ -178,14 +179,18 @@ def _resume(tracker: Tracker, series: Series, kept: int) -> None:
 def crack_of(result: Correlation, mouth: np.ndarray) -> Crack | None:
     """The crack in a frame, in px, from the end nearest to the mouth (2,) on; None where none stands out.
 
-    A step across which the field closes more than it slides is no crack, but noise or a fold of the field.
+    A step across which the field closes more than it slides is no crack, but noise or a fold of the field. A tip beyond
+    the field is moved to its border.
     """
     try:
         found = find_crack(result.points, np.nan_to_num(result.displacement), result.valid, mouth=mouth)
     except (ConvergenceError, InputError):  # no crack, or a field too small to show one
         return None
     opening, sliding = (float(np.nanmedian(v)) for v in (found.opening, found.sliding))
-    return None if opening < 0 and abs(sliding) < -opening else found
+    if opening < 0 and abs(sliding) < -opening:
+        return None
+    tip = np.clip(found.tip, result.points.min(axis=0), result.points.max(axis=0))
+    return replace(found, tip=tip, path=np.vstack([found.path[:-1], tip]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,11 +239,13 @@ def measure(bundle: Bundle, series: Series) -> Measurement:
     scatter, predicted, usual = np.zeros(count), np.ones(count), np.zeros(count)
     valid, split = np.ones(count), np.zeros(count)
     tip, tip_std, seconds = np.full((count, 2), np.nan), np.full(count, np.nan), 0.0
+    gauge, opened = NotchGauge.of(bundle.specimen, series), np.zeros((count, 2))
     for frame in series.frames():
         r, k = frame.result, frame.number
         valid[k], split[k] = np.count_nonzero(r.valid) / ever, np.count_nonzero(r.split) / ever
         scatter[k], predicted[k] = rest_scatter(r)
         usual[k] = np.median(r.std[r.valid])
+        opened[k] = gauge.opening(r) if gauge else (0.0, 0.0)
         seconds += frame.seconds
         if frame.crack is not None:
             tip[k], tip_std[k] = frame.crack.tip, frame.crack.tip_std
@@ -247,7 +254,8 @@ def measure(bundle: Bundle, series: Series) -> Measurement:
     if resting >= AT_REST:
         still = slice(1, resting + 1)
         factor = float(np.sqrt(np.sum(scatter[still] ** 2) / np.sum(predicted[still] ** 2)))
-    timing = synchronised(bundle, series.stamp, notch_opening(bundle.specimen, series, factor))
+    seen = None if gauge is None else Opening(opened[:, 0], factor * opened[:, 1], gauge.arms is None)
+    timing = synchronised(bundle, series.stamp, seen)
     noise = factor * float(np.median(usual[1:]))
     return Measurement(series, timing, factor, resting, noise, valid, split, tip, tip_std, seconds)
 
