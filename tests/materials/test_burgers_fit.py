@@ -26,7 +26,7 @@ def test_exact_data_give_the_constants_back(d1, d2, flow, tau2):
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    random, count = np.random.default_rng(5), 30
+    random, count = np.random.default_rng(5), 20
     held = dict.fromkeys(NAMES, 0)
     for _ in range(count):
         noise = np.exp(0.02 * random.normal(size=READINGS.size))
@@ -35,8 +35,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
             low, high = found.interval[name]
             held[name] += low <= getattr(MASTIC, name) <= high
             assert low < getattr(found.model, name) < high
-    # 95 % of 30; fewer than 24 have a chance of 3e-4
-    assert all(24 <= n <= 30 for n in held.values()), held
+    # 95 % of 20; fewer than 15 have a chance of 3e-4
+    assert all(15 <= n <= 20 for n in held.values()), held
 
 
 def test_bands_hold_the_true_curves():
