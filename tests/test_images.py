@@ -274,6 +274,7 @@ def test_images_identify_as_the_exact_fields_do(film, measured, both, tmp_path):
             shutil.copytree(tmp_path / "images" / "simulations", tmp_path / "exact" / "simulations")
     images, exact = (np.array(result["grid"]["objective"]) for result in found)
     assert [result["objective"] for result in found] == ["fields", "fields"]
+    assert any("against the record" in remark for remark in found[0]["remarks"])  # clock and noise are told
     off, noise = (
         images - exact,
         1.8e-6 * 1.6,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
 from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
+from pipeline.study.dic import summary as summary_of_images
 from pipeline.study.engines import Engine
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.levelling import Leveller, leveller, refuse_unlevelled
@@ -147,7 +148,8 @@ def identify(
     refuse_unlevelled(read, settings, aim)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
-    read = from_images(model, aim, folder, settings, progress or Silent())
+    model = from_images(model, aim, folder, settings, progress or Silent())
+    read = model.bundle
     field = read.need_fields() if aim is not Objective.LOAD else None
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
     refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
@@ -171,17 +173,19 @@ def choose_objective(bundle: Bundle, wanted: str | None) -> Objective:
     return Objective.FIELDS if bundle.images or bundle.fields is not None else Objective.LOAD
 
 
-def from_images(model: Model, aim: Objective, folder: Path, settings: RunSettings, progress: Progress) -> Bundle:
-    """The bundle, with the fields of its images where fields are compared; these are kept in FOLDER/dic.
+def from_images(model: Model, aim: Objective, folder: Path, settings: RunSettings, progress: Progress) -> Model:
+    """The model, its bundle with the fields of its images where fields are compared; these are kept in FOLDER/dic.
 
     What can be refused without the fields is refused before they are measured.
     """
     bundle = model.bundle
     if not bundle.images or aim is Objective.LOAD:
-        return bundle
+        return model
     bare = measured_test(bundle.need_curve(), None, bundle.stations, bundle.observation_points)
     refuse_hopeless(model, bare, Objective.LOAD, Rigid(settings.rigid))
-    return with_measured_fields(bundle, measured_fields(bundle, folder / DIC_FOLDER, settings, progress))
+    found = measured_fields(bundle, folder / DIC_FOLDER, settings, progress)
+    told = (f"images: {summary_of_images(found.result)}", *found.result["warnings"])
+    return replace(model, bundle=with_measured_fields(bundle, found), remarks=(*model.remarks, *told))
 
 
 def search(campaign: Campaign, aim: Objective) -> Estimate:
