@@ -48,7 +48,7 @@ class Drive:
     @property
     def error(self) -> float:
         """Error of the load over the test so far: twice the root mean square of the lag over CMOD."""
-        return ERROR_PER_LAG * float(np.sqrt(self.lag_squares / self.cmod)) if self.cmod > 0 else 0.0
+        return ERROR_PER_LAG * float(np.sqrt(max(self.lag_squares, 0.0) / self.cmod)) if self.cmod > 0 else 0.0
 
     def measure(self, energy: Energies, cmod: float, load: float, steps: int, share: float) -> Drive:
         """The lag over the last `steps`, `share` of a period: it rises at once and fades over a period.

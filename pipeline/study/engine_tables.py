@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.core.problem import Solution
+from pipeline.core.problem import Kinematics, Solution
 from pipeline.equilibrium import solve as equilibrium
 from pipeline.lmp import simulate as lammps
 from pipeline.study.agreement import curve_difference, field_difference, peak_difference
@@ -70,3 +70,14 @@ def size_rows(geometry: str, radii_mm: Sequence[float], seed: int = 1) -> Iterat
     if len(counts) > 1:
         exponent = np.polyfit(np.log(counts), np.log(seconds), 1)[0]
         yield f"| growth of the time with the number of particles | | power {exponent:.2f} | |"
+
+
+def kinematics_rows(trials: Sequence[Trial]) -> Iterator[str]:
+    """Finite against small kinematics by the equilibrium engine: what the choice changes."""
+    yield "| specimen | load | field | peak |"
+    yield "|---|---|---|---|"
+    for trial in trials:
+        finite = trial.with_kinematics(Kinematics.FINITE)
+        runs = [equilibrium.solve(t.problem) for t in (finite, trial.with_kinematics(Kinematics.SMALL))]
+        curve, field = apart(trial, *runs)
+        yield f"| {trial.name} | {curve:.2%} | {field:.2%} | {peak_difference(*runs):+.2%} |"

@@ -44,7 +44,7 @@ def engine(name: str) -> Engine:
     if name == "equilibrium":
         from pipeline.equilibrium import solve
 
-        return Engine(f"equilibrium, cohesive-bpm {__version__}", solve.solve)
+        return Engine(f"equilibrium to {solve.TOLERANCE:g}, cohesive-bpm {__version__}", solve.solve)
     if name == "reference":
         from pipeline.reference import solve as steps
 
