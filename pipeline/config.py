@@ -73,8 +73,7 @@ class RunSettings(BaseModel):
         description="what is interpolated over the grid: the objective, as in the paper, or every simulated number",
     )
     refinement_count: Annotated[int, Field(ge=0, le=4)] = Field(
-        default=1,
-        description="how often the grid may be halved around an optimum that it does not resolve",
+        default=0, description="how often the grid may be halved around an optimum that it does not resolve"
     )
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,

@@ -140,6 +140,12 @@ class Estimate:
                 f"The weakest curvature at the optimum is only {self.certainty:.1f} times its scatter from node to "
                 "node: the intervals are themselves unsure; widen the grid."
             )
+        if self.accepted and not self.resolved:
+            f_max, delta_max = self.data_position
+            found.append(
+                f"With interpolated data instead of an interpolated objective the optimum is ({f_max:.4g} N, "
+                f'{delta_max:.3g} m), further off than noise and discrepancy explain: set surrogate = "data".'
+            )
         return (*found, *self.left_out)
 
 
