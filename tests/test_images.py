@@ -207,6 +207,17 @@ def test_another_scale_measures_the_fields_again_but_no_image(film, measured, tm
     np.testing.assert_allclose(read_fields(out / "fields.h5").abscissa, stamp - 0.25, atol=1e-9)  # round-off
 
 
+def test_without_a_record_the_camera_keeps_its_own_time(film, measured, tmp_path):
+    bundle, out = shutil.copytree(film, tmp_path / "film"), shutil.copytree(measured, tmp_path / "out")
+    (bundle / "load_cmod.csv").unlink()
+    done = run("dic", bundle, "-o", out)
+    assert done.exit_code == 0, done.stderr
+    assert "28 of 28 images are kept" in done.stderr
+    result = read_result(out)
+    assert (result["sync_offset_s"], result["sync_std_s"]) == (None, None)
+    np.testing.assert_array_equal(read_fields(out / "fields.h5").abscissa, read_bundle(bundle).frame_time)
+
+
 class Interrupt(Silent):
     """Stops after so many images, as Ctrl-C does."""
 
