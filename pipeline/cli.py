@@ -5,6 +5,7 @@ Everything that computes is imported inside the commands, so that `--help` is qu
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -312,4 +313,7 @@ def virtual_test(
 
 def main() -> None:
     """The command `cohesive-bpm`."""
-    app(prog_name="cohesive-bpm")
+    try:
+        app(prog_name="cohesive-bpm")
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what comes now would only turn a result into a failure
