@@ -123,7 +123,7 @@ def _estimated(left: np.ndarray, residual: np.ndarray, noise: np.ndarray) -> tup
     if scale == 0:
         return 0.0, np.inf
     square = (scale * np.linspace(0, 8, 801)) ** 2
-    variance = hiss + square[:, None] * strength
+    variance = np.maximum(hiss + square[:, None] * strength, 1e-12 * square[-1] * strength[0])  # data without noise
     likelihood = -0.5 * np.sum(np.log(variance) + heard / variance, axis=1)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()

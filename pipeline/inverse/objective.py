@@ -146,6 +146,11 @@ def compare(measured: Measured, simulated: Simulated, objective: Objective, rigi
         use_load = _common_load(measured, simulated)
     found = Comparison(objective, rigid, measured, use_field, use_load)
     _enough(found)
+    if objective is Objective.BOTH and not found.field_scale > 0:
+        raise InputError(
+            "objective = both divides displacements by their noise, but that is given as zero: state it in [noise] "
+            "displacement_std_mm or in the fields, or compare fields or load alone"
+        )
     return found
 
 

@@ -154,3 +154,13 @@ def test_a_failed_simulation_and_a_wrong_confidence_are_refused():
         estimate(GRID, Simulated(load=dead), measured(CENTRE, None), Settings(Objective.LOAD, 0.0))
     with pytest.raises(InputError, match="confidence"):
         Settings(Objective.LOAD, 0.0, confidence=95)
+
+
+def test_fields_said_to_be_exact_have_finite_intervals():
+    truth = (75.3, 1.07e-4)
+    data = measured(truth, np.random.default_rng(6))
+    exact = replace(data, field=replace(data.field, std=np.zeros_like(data.field.std)))
+    found = estimate(GRID, SIMULATED, exact, Settings(Objective.FIELDS, 0.0))
+    assert found.accepted
+    assert found.uncertainty.f_max[0] < truth[0] < found.uncertainty.f_max[1]  # the residual speaks instead
+    assert np.isfinite(found.uncertainty.delta_max).all()

@@ -141,3 +141,9 @@ def test_measurements_must_be_at_the_stations_and_weighed():
         replace(noisy(), cmod=STATIONS[:5])
     with pytest.raises(InputError, match="load_std_n"):
         replace(noisy(), load_std=np.zeros(10))
+
+
+def test_fields_without_noise_cannot_be_weighed_against_loads():
+    exact = measured((75.0, 1.1e-4), None, noise=0.0)
+    with pytest.raises(InputError, match="noise"):
+        compare(exact, simulated(Design(CENTRE)), Objective.BOTH, Rigid.FIT)
