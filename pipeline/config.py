@@ -69,8 +69,8 @@ class RunSettings(BaseModel):
     )
     recentring_steps: Annotated[int, Field(ge=1, le=10)] = Field(default=2, description="grid lines by which it moves")
     surrogate: Literal["objective", "data"] = Field(
-        default="objective",
-        description="what is interpolated over the grid: the objective, as in the paper, or every simulated number",
+        default="data",
+        description="what is interpolated over the grid: every simulated number, or the objective, as in the paper",
     )
     refinement_count: Annotated[int, Field(ge=0, le=4)] = Field(
         default=0, description="how often the grid may be halved around an optimum that it does not resolve"

@@ -71,6 +71,8 @@ class Estimate:
     data_position : (2,) array, N and m; where that Φ has its own minimum
     resolved : bool; the optimum is accepted, and a finer grid would leave it where it is beside noise and discrepancy
     minimum : Minimum of what `settings.surrogate` names
+    valley : what was minimised: Φ of interpolated data, or the surrogate
+    multinomial_minimum : Minimum of the surrogate, the paper's estimate
     others : tuple of Minimum; further local minima inside the grid that are no worse by more than loo_error
     refused : str; why the optimum is not accepted, empty where it is
     uncertainty : Uncertainty, or None where the optimum is not accepted
@@ -90,6 +92,8 @@ class Estimate:
     data_position: np.ndarray
     resolved: bool
     minimum: Minimum
+    valley: SquaredDifference | LagrangeSurrogate
+    multinomial_minimum: Minimum
     others: tuple[Minimum, ...]
     refused: str
     uncertainty: Uncertainty | None
@@ -172,8 +176,9 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     surrogate = LagrangeSurrogate(design.f_max, design.delta_max, objective)
     interpolated = LagrangeSurrogate(design.f_max, design.delta_max, features)
     by_data = settings.surrogate is Surrogate.DATA
-    function = SquaredDifference(interpolated, comparison.target) if by_data else surrogate
-    best, *others = minimise(function, np.array(design.nodes()))
+    nodes = np.array(design.nodes())
+    valley = SquaredDifference.of(interpolated, comparison.target) if by_data else surrogate
+    best, *others = minimise(valley, nodes)
     loo_error = float(np.sqrt(np.mean(leave_one_out(surrogate) ** 2)))
     displacement, load = (_interpolated(design, a) for a in (simulated.displacement, simulated.load))
     fit = Fit(comparison, surrogate, interpolated, load, best, by_data)
@@ -191,6 +196,8 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
         data_position=data_position,
         resolved=not refused and resolves(fit, data_position, settings.discrepancy),
         minimum=best,
+        valley=valley,
+        multinomial_minimum=minimise(surrogate, nodes)[0] if by_data else best,
         others=tuple(m for m in others if m.converged and m.interior and m.value <= best.value + loo_error),
         refused=refused,
         uncertainty=None

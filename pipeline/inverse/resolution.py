@@ -17,7 +17,7 @@ LEAST = 1e-3  # of the parameters themselves; finer than this nothing is asked f
 
 def data_minimum(fit: Fit) -> np.ndarray:
     """Where Φ of the interpolated data is smallest, from the optimum on; (2,), N and m."""
-    squares = SquaredDifference(fit.features, fit.comparison.target)
+    squares = SquaredDifference.of(fit.features, fit.comparison.target)
     return minimise(squares, fit.minimum.position[None])[0].position
 
 

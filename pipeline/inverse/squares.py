@@ -11,7 +11,10 @@ from pipeline.inverse.surrogate import LagrangeSurrogate
 
 @dataclass(frozen=True)
 class SquaredDifference:
-    """‖d(λ) − d̂‖² with its exact derivatives; λ = (f_max, delta_max) in N and m.
+    """‖Σ w(λ) d − d̂‖² = wᵀGw with its exact derivatives; λ = (f_max, delta_max) in N and m.
+
+    The Lagrange weights w of the nodes add up to one, so the difference of interpolated and measured data is the
+    interpolated difference, and G holds the products of the nodes' differences.
 
     Crack paths change from node to node, so that simulated data scatter by some j about a smooth course. Φ at a node
     far from the optimum, where the residual r is large, then scatters by 2r·j, and its multinomial (Hill et al. 2017,
@@ -19,32 +22,46 @@ class SquaredDifference:
 
     Parameters
     ----------
-    features : LagrangeSurrogate of the simulated data (n_f, n_d, N)
-    target : (N,) array; the measured data
+    weights : LagrangeSurrogate of the n nodes' weights, (n,) a point
+    gram : (n, n) array
     """
 
-    features: LagrangeSurrogate
-    target: np.ndarray
+    weights: LagrangeSurrogate
+    gram: np.ndarray
+
+    @staticmethod
+    def of(features: LagrangeSurrogate, target: np.ndarray) -> SquaredDifference:
+        """From simulated data (n_f, n_d, N) and measured ones (N,)."""
+        shape = features.values.shape[:2]
+        count = shape[0] * shape[1]
+        difference = (features.values - target).reshape(count, -1)
+        weights = LagrangeSurrogate(features.f_nodes, features.d_nodes, np.eye(count).reshape(*shape, count))
+        return SquaredDifference(weights, difference @ difference.T)
 
     @property
     def lower(self) -> np.ndarray:
-        return self.features.lower
+        return self.weights.lower
 
     @property
     def upper(self) -> np.ndarray:
-        return self.features.upper
+        return self.weights.upper
 
     def value(self, parameters: np.ndarray) -> np.ndarray:
         """Φ of the interpolated data."""
-        return np.sum((self.features.value(parameters) - self.target) ** 2)
+        weight = self.weights.value(parameters)
+        return weight @ self.gram @ weight
 
     def gradient(self, parameters: np.ndarray) -> np.ndarray:
-        """2 Jᵀr; (2,)."""
-        residual = self.features.value(parameters) - self.target
-        return 2 * self.features.gradient(parameters) @ residual
+        """2 w'ᵀGw; (2,)."""
+        return 2 * self.weights.gradient(parameters) @ self.gram @ self.weights.value(parameters)
 
     def hessian(self, parameters: np.ndarray) -> np.ndarray:
-        """2 (JᵀJ + Σ r ∂²d); (2, 2)."""
-        residual = self.features.value(parameters) - self.target
-        slopes = self.features.gradient(parameters)
-        return 2 * (slopes @ slopes.T + self.features.hessian(parameters) @ residual)
+        """2 (w'ᵀGw' + w''ᵀGw); (2, 2)."""
+        slope = self.weights.gradient(parameters)
+        bend = self.weights.hessian(parameters) @ self.gram @ self.weights.value(parameters)
+        return 2 * (slope @ self.gram @ slope.T + bend)
+
+    def on_grid(self, f_max: np.ndarray, delta_max: np.ndarray) -> np.ndarray:
+        """Φ on another tensor grid, for pictures; (len(f_max), len(delta_max))."""
+        weight = self.weights.on_grid(f_max, delta_max)
+        return np.einsum("abn,nm,abm->ab", weight, self.gram, weight, optimize=True)

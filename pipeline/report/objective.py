@@ -17,9 +17,9 @@ CHI_SQUARE_2D_95 = 5.991  # 95 % of a normal pair lie inside this squared radius
 
 
 def objective_surface(axes: Axes, found: Estimate, resolution: int = 201) -> Axes:
-    """Level lines of the Lagrange multinomial, its nodes, the optimum and its 95 % region.
+    """Level lines of what was minimised, the nodes, the optimum and its 95 % region.
 
-    Colour is the root of P per datum where that has a meaning (µm for fields, noise units otherwise); the
+    Colour is the root of Φ per datum where that has a meaning (µm for fields, noise units otherwise); the
     dashed line joins parameters of the optimum's fracture energy.
 
     Parameters
@@ -31,7 +31,7 @@ def objective_surface(axes: Axes, found: Estimate, resolution: int = 201) -> Axe
     design = found.design
     f_max = np.linspace(design.f_max[0], design.f_max[-1], resolution)
     delta_max = np.linspace(design.delta_max[0], design.delta_max[-1], resolution)
-    height, label = _per_datum(found, found.surrogate.on_grid(f_max, delta_max))
+    height, label = _per_datum(found, found.valley.on_grid(f_max, delta_max))
     levels = _levels(height)
     norm = LogNorm(levels[0], levels[-1])
     height = np.maximum(height, levels[0])

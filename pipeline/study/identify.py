@@ -275,6 +275,7 @@ def identification_result(
         "covariance": doubt and doubt.covariance,
         "objective": found.settings.objective,
         "surrogate": found.settings.surrogate,
+        "paper": paper_result(found),
         "objective_min": found.minimum.value,
         "interior": found.interior,
         "accepted": found.accepted,
@@ -300,6 +301,13 @@ def identification_result(
         **cmod_energy(optimum.curve, problem.specimen),
         "measured_cmod_fracture_energy_j_per_m2": measured_energy["cmod_fracture_energy_j_per_m2"],
     }
+
+
+def paper_result(found: Estimate) -> dict[str, Any]:
+    """What the paper's multinomial of the objective gives on the same grid."""
+    minimum = found.multinomial_minimum
+    f_max, delta_max = minimum.position
+    return {"f_max_n": f_max, "delta_max_m": delta_max, "interior": minimum.interior, "objective_min": minimum.value}
 
 
 def identification_arrays(campaign: Campaign, found: Estimate, optimum: Solution) -> dict[str, Any]:

@@ -23,7 +23,7 @@ def test_derivatives_are_those_of_a_known_square():
     """d = (a, b, ab) is met exactly by two lines each way, so Φ and its derivatives are known in closed form."""
     a, b = np.array([1.0, 2.0, 4.0]), np.array([0.5, 1.0, 3.0])
     data = np.stack([*np.meshgrid(a, b, indexing="ij"), np.outer(a, b)], axis=-1)
-    squares = SquaredDifference(LagrangeSurrogate(a, b, data), np.array([1.0, 2.0, 5.0]))
+    squares = SquaredDifference.of(LagrangeSurrogate(a, b, data), np.array([1.0, 2.0, 5.0]))
     x, y = 3.0, 2.5
     r = np.array([x - 1, y - 2, x * y - 5])
     assert squares.value(np.array([x, y])) == pytest.approx(r @ r, rel=1e-13)  # round-off

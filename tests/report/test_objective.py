@@ -77,6 +77,6 @@ def test_an_optimum_on_the_edge_is_called_so_and_has_no_region():
 
 def test_a_surface_that_touches_zero_is_drawn():
     one = found(Objective.FIELDS, GRID.nodes()[12])
-    flat = replace(one, surrogate=replace(one.surrogate, values=0 * one.surrogate.values))
+    flat = replace(one, valley=replace(one.surrogate, values=0 * one.surrogate.values))
     for each in (one, flat):
         assert png(lambda axes, each=each: objective_surface(axes, each, 21))
