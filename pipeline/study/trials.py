@@ -34,6 +34,7 @@ class Trial:
     ----------
     name : str
     f_max, delta_max, energy : float; estimate over truth
+    paper : (f_max, delta_max) of the paper's multinomial, over the truth
     inside_f, inside_delta : bool; whether the 95 % interval holds the truth
     interior : bool
     peak_mismatch : float; simulated over measured peak load, minus one
@@ -44,6 +45,7 @@ class Trial:
     f_max: float
     delta_max: float
     energy: float
+    paper: tuple[float, float]
     inside_f: bool
     inside_delta: bool
     interior: bool
@@ -139,6 +141,7 @@ def compare(name: str, truth: dict[str, Any], result: dict[str, Any]) -> Trial:
         f_max,
         delta_max,
         f_max * delta_max,
+        (result["paper"]["f_max_n"] / truth["f_max_n"], result["paper"]["delta_max_m"] / truth["delta_max_m"]),
         inside["f_max_n"],
         inside["delta_max_m"],
         result["interior"],
@@ -149,20 +152,29 @@ def compare(name: str, truth: dict[str, Any], result: dict[str, Any]) -> Trial:
 
 def trial_table(trials: Sequence[Trial]) -> str:
     """Trials as a Markdown table, the medians and the worst at its foot."""
-    head = "| test | f_max | delta_max | G_f | truth in interval (f_max, delta_max) | peak load | seconds |"
-    rows = [head, "|---|---|---|---|---|---|---|"]
+    rows = [
+        "| test | f_max | delta_max | G_f | truth in interval (f_max, delta_max) | peak load | seconds "
+        "| f_max, delta_max by the paper's multinomial |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
     for t in trials:
         inside = f"{_yes(t.inside_f)}, {_yes(t.inside_delta)}"
         rows.append(
             f"| {t.name} | {_off(t.f_max)} | {_off(t.delta_max)} | {_off(t.energy)} | {inside} | "
-            f"{t.peak_mismatch:+.1%} | {t.seconds:.0f} |"
+            f"{t.peak_mismatch:+.1%} | {t.seconds:.0f} | {_off(t.paper[0])}, {_off(t.paper[1])} |"
         )
-    ratios = np.array([(t.f_max, t.delta_max, t.energy) for t in trials])
-    for name, of in (("median", np.median), ("worst", lambda r, axis: r[np.argmax(np.abs(r - 1), axis), range(3)])):
-        rows.append(f"| **{name}** | " + " | ".join(_off(v) for v in of(ratios, axis=0)) + " | | | |")
+    ratios = np.array([(t.f_max, t.delta_max, t.energy, *t.paper) for t in trials])
+    for name, of in (("median", np.median), ("worst", _worst)):
+        *ours, paper_f, paper_delta = (_off(ratio) for ratio in of(ratios, axis=0))
+        rows.append(f"| **{name}** | {' | '.join(ours)} | | | | {paper_f}, {paper_delta} |")
     inside_f, inside_d = (sum(getattr(t, k) for t in trials) for k in ("inside_f", "inside_delta"))
-    rows.append(f"| **truth inside** | {inside_f} of {len(trials)} | {inside_d} of {len(trials)} | | | | |")
+    rows.append(f"| **truth inside** | {inside_f} of {len(trials)} | {inside_d} of {len(trials)} | | | | | |")
     return "\n".join(rows) + "\n"
+
+
+def _worst(ratios: np.ndarray, axis: int) -> np.ndarray:
+    """The ratio furthest from one of each column."""
+    return np.take_along_axis(ratios, np.argmax(np.abs(ratios - 1), axis, keepdims=True), axis)[0]
 
 
 def _off(ratio: float) -> str:
