@@ -97,7 +97,7 @@ def synchronise(
     if std > reach:
         raise ConvergenceError(
             "the offset cannot be told from a shift of the opening: the frames show neither the first motion nor a "
-            "change of rate; give sync_offset_s by hand"
+            "change of rate"
         )
     return Synchronisation(offset, std, gain, zero, float(np.sqrt(np.mean(left**2))), left.size)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from pipeline.core.field import DisplacementField
 from pipeline.core.specimen import Specimen
 from pipeline.dic.correlation import Correlation
 from pipeline.dic.gauge import opening, rigid_opening
-from pipeline.dic.synchronise import synchronise
+from pipeline.dic.synchronise import Synchronisation, synchronise
 from pipeline.store.bundle import Bundle
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 FEET = 12  # points that a foot of the gauge needs on its side
 SUBSETS = 2  # edges of a subset that a foot reaches
 HIGH = 3  # edges of a subset that an arm must be high, to show how it turns
+OFF_SCALE = 0.1  # camera and clip gauge span the same points: a gain that differs more from 1 is a wrong scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,7 @@ class Timing:
     zero : float, m; opening seen when the record shows none
     rms : float, m; of what is left
     opening : Opening or None, where the notch is not in the pictures
+    doubt : str or None; why the offset should not be trusted
     """
 
     offset: float
@@ -61,6 +64,7 @@ class Timing:
     zero: float = 0.0
     rms: float = float("nan")
     opening: Opening | None = None
+    doubt: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +175,27 @@ def synchronised(bundle: Bundle, stamp: np.ndarray, seen: Opening | None) -> Tim
         found = synchronise(stamp, seen.value, bundle.curve, fit_gain=away, fit_bending=away)
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"frames.csv against load_cmod.csv: {error}; or give [dic] sync_offset_s") from error
-    return Timing(found.offset, found.std, "estimated", found.gain, found.zero, found.rms, seen)
+    doubt = _doubt(stamp, seen, bundle.curve, found)
+    return Timing(found.offset, found.std, "estimated", found.gain, found.zero, found.rms, seen, doubt)
+
+
+def _doubt(stamp: np.ndarray, seen: Opening, curve: LoadCurve, found: Synchronisation) -> str | None:
+    """Why an offset should not be trusted: another scale explains the images far better, or its error is too large."""
+    if seen.shown:
+        with contextlib.suppress(InputError, ConvergenceError):
+            free = synchronise(stamp, seen.value, curve, fit_gain=True)
+            if abs(free.gain - 1) > OFF_SCALE and free.rms < found.rms / 2:
+                return (
+                    f"the images show {free.gain:.2f} times the CMOD of the record: check [camera] mm_per_px, "
+                    "gauge_length_mm and the units of cmod_mm; until then neither fields nor clock are to be trusted"
+                )
+    every = float(np.median(np.diff(stamp)))
+    if found.std > every:
+        return (
+            f"the camera's clock is known to ± {found.std:.3g} s only, and an image was taken every {every:.3g} s: "
+            "check clock.png, the order of the images and their times, or give [dic] sync_offset_s"
+        )
+    return None
 
 
 def _given(offset: float, stamp: np.ndarray, seen: Opening | None, curve: LoadCurve) -> Timing:
@@ -196,13 +220,14 @@ def sentence(timing: Timing) -> str:
 
 def remarks(timing: Timing) -> list[str]:
     """What a user should know of the opening that was seen."""
-    seen = timing.opening
+    seen, doubt = timing.opening, [timing.doubt] if timing.doubt else []
     if seen is None:
         return ["the images do not show enough of both flanks of the notch: the opening was not measured"]
     if not seen.shown:
         return [
             "the gauge is not in the images: its opening was told from how the flanks of the notch turn"
             + (f", {timing.gain:.2f} times the record's CMOD beside a part that follows the load"
-               if timing.how == "estimated" else "")
+               if timing.how == "estimated" else ""),
+            *doubt,
         ]  # fmt: skip
-    return []
+    return doubt

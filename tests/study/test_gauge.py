@@ -63,6 +63,20 @@ def test_out_of_sight_of_the_gauge_gain_and_bending_are_fitted_and_told(bundle):
     assert "0.97 times the record's CMOD" in told or "0.96" in told or "0.98" in told
 
 
+@pytest.mark.parametrize("scale", [0.5, 0.8, 1.25])
+def test_a_wrong_scale_of_the_camera_is_told(bundle, scale):
+    curve = LoadCurve(TIME, 8e-6 * np.maximum(TIME - 8, 0) * (1 + np.maximum(TIME - 25, 0) / 10), 1 + 0 * TIME)
+    value = scale * np.interp(STAMP - 1.0, TIME, curve.cmod)
+    found = synchronised(replace(bundle, curve=curve), STAMP, Opening(value, np.full(STAMP.size, 1e-6), True))
+    [told] = remarks(found)
+    assert told.startswith(f"the images show {scale:.2f} times the CMOD of the record")
+
+
+def test_a_clock_that_is_not_known_to_an_image_is_told(bundle):
+    [told] = remarks(synchronised(bundle, STAMP, seen(STAMP, 2.5, noise=1e-4)))  # 12 s of the motion's rate
+    assert "the order of the images" in told
+
+
 def test_an_offset_that_was_given_is_taken(bundle):
     found = synchronised(given(bundle, 2.0), STAMP, seen(STAMP, 2.5))
     assert (found.offset, found.std, found.how) == (2.0, None, "given")
