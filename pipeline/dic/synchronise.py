@@ -91,7 +91,10 @@ def synchronise(
     )
     offset = float(found.x)
     if abs(offset) > reach - step:
-        raise ConvergenceError(f"the best offset lies at the end of the reach of ±{reach:g} s: give a larger reach")
+        raise ConvergenceError(
+            f"no offset within ±{reach:.3g} s brings the opening that is seen onto the CMOD: the clocks are further "
+            "apart, or the scale or origin of the camera is wrong"
+        )
     _, left, slope, basis, (gain, zero) = fit.at(offset)
     std = _error(left, slope, basis)
     if std > reach:
