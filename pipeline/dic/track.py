@@ -151,7 +151,7 @@ def track(
 
     Parameters
     ----------
-    frames : pictures of one size, the first unloaded; read one at a time, two are kept
+    frames : pictures of one size, the first unloaded; read one at a time, at most four are in memory
     settings, renew_znssd : as of `Tracker`
 
     Yields
