@@ -148,7 +148,7 @@ def compare(measured: Measured, simulated: Simulated, objective: Objective, rigi
     _enough(found)
     if objective is Objective.BOTH and not found.field_scale > 0:
         raise InputError(
-            "objective = both divides displacements by their noise, but that is given as zero: state it in [noise] "
+            "objective = both divides displacements by their noise, but std_mm is zero: state the noise in [noise] "
             "displacement_std_mm or in the fields, or compare fields or load alone"
         )
     return found

@@ -97,5 +97,7 @@ def _time_problems(file: str, rows: list[list[str]]) -> list[str]:
         if not np.isfinite(times[-1]):
             faults.append(f"row {line}: time_s = '{','.join(row[1:])}' is not a finite number")
         elif len(times) > 1 and times[-1] <= times[-2]:
-            faults.append(f"row {line}: time_s = {times[-1]:g} must be larger than {times[-2]:g} in the row before")
+            faults.append(
+                f"row {line}: time_s = {times[-1]:.12g} must be larger than {times[-2]:.12g} in the row before"
+            )
     return [f"{file}: {fault}" for fault in shortened(faults)]

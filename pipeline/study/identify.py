@@ -163,7 +163,7 @@ def identify(
     write_arrays(folder, IDENTIFY, identification_arrays(campaign, found, optimum))
     write_result(folder, result)
     identification_page(folder, model, measured, found, problem, optimum, result)
-    return _summary(found)
+    return _summary(found, campaign.model.remarks)
 
 
 def choose_objective(bundle: Bundle, wanted: str | None) -> Objective:
@@ -335,9 +335,9 @@ def identification_arrays(campaign: Campaign, found: Estimate, optimum: Solution
     }
 
 
-def _summary(found: Estimate) -> str:
+def _summary(found: Estimate, remarks: tuple[str, ...]) -> str:
     text = f"f_max = {found.f_max:.4g} N, delta_max = {found.delta_max:.4g} m"
     if found.uncertainty is not None:
         (a, b), (c, d) = found.uncertainty.f_max, found.uncertainty.delta_max
         text += f"; 95 %: {a:.4g} to {b:.4g} N, {c:.4g} to {d:.4g} m"
-    return "\n".join([text, *found.warnings])
+    return "\n".join([text, *found.warnings, *remarks])

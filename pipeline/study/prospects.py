@@ -34,12 +34,7 @@ def refuse_hopeless(model: Model, measured: Measured, aim: Objective, rigid: Rig
     _refuse_early_end(float(measured.cmod[0]), model.bundle.cmod_max)
     _refuse_fixed(model)
     _refuse_wild(model, measured)
-    best = compare(measured, _everything_until(model.bundle.cmod_max, measured), aim, rigid)
-    if aim is Objective.BOTH and best.field_scale == 0:
-        raise InputError(
-            "fields.h5: std_mm is zero, so that displacements cannot be weighed against loads: write their standard "
-            "deviation, or choose --objective fields or load"
-        )
+    compare(measured, _everything_until(model.bundle.cmod_max, measured), aim, rigid)
 
 
 def shows_peak(curve: LoadCurve) -> bool:
