@@ -184,11 +184,8 @@ def _doubt(stamp: np.ndarray, seen: Opening, curve: LoadCurve, found: Synchronis
     if seen.shown:
         with contextlib.suppress(InputError, ConvergenceError):
             free = synchronise(stamp, seen.value, curve, fit_gain=True)
-            if abs(free.gain - 1) > OFF_SCALE and free.rms < found.rms / 2:
-                return (
-                    f"the images show {free.gain:.2f} times the CMOD of the record: check [camera] mm_per_px, "
-                    "gauge_length_mm and the units of cmod_mm; until then neither fields nor clock are to be trusted"
-                )
+            if free.rms < found.rms / 2 and (wrong := _off_scale(free.gain)):
+                return wrong
     every = float(np.median(np.diff(stamp)))
     if found.std > every:
         return (
@@ -198,15 +195,31 @@ def _doubt(stamp: np.ndarray, seen: Opening, curve: LoadCurve, found: Synchronis
     return None
 
 
+def _off_scale(gain: float) -> str | None:
+    """What a gain that differs too much from one says."""
+    if abs(gain - 1) <= OFF_SCALE:
+        return None
+    return (
+        f"the images show {gain:.2f} times the CMOD of the record: check [camera] mm_per_px, gauge_length_mm and the "
+        "units of cmod_mm; until then neither fields nor clock are to be trusted"
+    )
+
+
 def _given(offset: float, stamp: np.ndarray, seen: Opening | None, curve: LoadCurve) -> Timing:
     """What is left between the two at an offset that was given."""
     if seen is None:
         return Timing(offset, None, "given")
     cmod = curve.cmod_at(stamp - offset)
-    left = (seen.value - cmod)[np.isfinite(cmod) & np.isfinite(seen.value)]
+    both = np.isfinite(cmod) & np.isfinite(seen.value)
+    left = (seen.value - cmod)[both]
     zero = float(np.mean(left)) if left.size else 0.0
     rms = float(np.std(left)) if left.size else float("nan")
-    return Timing(offset, None, "given", 1.0, zero, rms, seen)
+    doubt = None
+    if seen.shown and left.size > 2 and np.ptp(cmod[both]) > 0:
+        slope, rest = np.polyfit(cmod[both], seen.value[both], 1)
+        if np.std(seen.value[both] - slope * cmod[both] - rest) < rms / 2:
+            doubt = _off_scale(float(slope))
+    return Timing(offset, None, "given", 1.0, zero, rms, seen, doubt)
 
 
 def sentence(timing: Timing) -> str:

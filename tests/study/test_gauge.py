@@ -72,6 +72,17 @@ def test_a_wrong_scale_of_the_camera_is_told(bundle, scale):
     assert told.startswith(f"the images show {scale:.2f} times the CMOD of the record")
 
 
+def test_a_wrong_scale_is_told_beside_a_clock_that_was_given(bundle):
+    curve = LoadCurve(TIME, 8e-6 * np.maximum(TIME - 8, 0), 1 + 0 * TIME)
+    bent = given(replace(bundle, curve=curve), 1.0)
+    told = [
+        remarks(synchronised(bent, STAMP, Opening(scale * np.interp(STAMP - 1.0, TIME, curve.cmod), noise, True)))
+        for scale, noise in ((0.5, np.full(STAMP.size, 1e-6)), (1.0, np.full(STAMP.size, 1e-6)))
+    ]
+    assert told[0][0].startswith("the images show 0.50 times the CMOD of the record")
+    assert told[1] == []
+
+
 def test_a_clock_that_is_not_known_to_an_image_is_told(bundle):
     [told] = remarks(synchronised(bundle, STAMP, seen(STAMP, 2.5, noise=1e-4)))  # 12 s of the motion's rate
     assert "the order of the images" in told
