@@ -123,7 +123,10 @@ class Tracker:
         result, renewed = self._found(picture, grey, start, number)
         if result is None:
             remark = picture.range.remark(grey)
-            raise ConvergenceError(f"frame {number}{remark}: the speckle of the frame before is not found again")
+            raise ConvergenceError(
+                f"frame {number}{remark}: the speckle of the frame before is not found again; if the picture shows "
+                "something else, leave it out, with its row in frames.csv"
+            )
         self.sound = max(0.0 if renewed else self.sound, _share(result, self._shape))
         self._earlier = self._before[2] if self._before else None
         self._before, self.number = (grey, picture, result), number

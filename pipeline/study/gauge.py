@@ -167,8 +167,8 @@ def synchronised(bundle: Bundle, stamp: np.ndarray, seen: Opening | None) -> Tim
         return _given(given, stamp, seen, bundle.curve)
     if seen is None:
         raise InputError(
-            "the images do not show both flanks of the notch, so that the camera's clock cannot be found by its "
-            "opening: give [dic] sync_offset_s"
+            "too few subsets lie on both flanks of the notch, so that the camera's clock cannot be found by its "
+            "opening: check [camera] mm_per_px and origin_px, roi_px and grid_step_px, or give [dic] sync_offset_s"
         )
     try:
         away = not seen.shown
