@@ -23,8 +23,6 @@ from pipeline.study.identify import identify
 from pipeline.study.virtual_test import Request, draw_truth, prepare, recording_of, virtual_test, with_noise
 from pipeline.twin.virtual_test import exact_record, noisy_record
 
-DENSE_MM = {"columns_mm": tuple(1.5 * k for k in range(-14, 15) if k), "rows_mm": tuple(1.5 * k for k in range(-6, 14))}
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -85,7 +83,6 @@ def same_lattice_trial(
     progress: Progress | None = None,
     *,
     config: Path | None = None,
-    dense: bool = False,
     **how: Any,
 ) -> Trial:
     """Identify a test that was broken on the identifying lattice itself: noise and interpolation are what remains.
@@ -93,22 +90,18 @@ def same_lattice_trial(
     Parameters
     ----------
     folder, seed, objective, config, how : as of `twin_trial`
-    dense : compare all measured points around the notch tip instead of the paper's sixteen
     """
-    name = f"same-{seed}{'-dense' if dense else ''}"
+    name = f"same-{seed}"
     bundle, out = folder / name, folder / f"identified-{name}-{objective}"
     if not (bundle / "truth.json").is_file():
-        same_lattice_test(bundle, seed, Request(**how), dense, progress or Silent())
+        same_lattice_test(bundle, seed, Request(**how), progress or Silent())
     return _identified(bundle, out, seed, objective, config, progress)
 
 
-def same_lattice_test(out: Path, seed: int, request: Request, dense: bool, progress: Progress) -> None:
+def same_lattice_test(out: Path, seed: int, request: Request, progress: Progress) -> None:
     """A bundle like that of a virtual test, but of the model that identifies it, solved by LAMMPS."""
     of_section, of_truth, of_noise = np.random.default_rng(seed).spawn(3)
     experiment, images = prepare(request, out.name, of_section)
-    if dense:
-        places = experiment.observation.model_copy(update=DENSE_MM)
-        experiment = experiment.model_copy(update={"observation": places})
     write_bundle(out, experiment, images)
     bundle = read_bundle(out)
     truth, recording = draw_truth(request, bundle, of_truth), recording_of(bundle, request, Clock())

@@ -39,7 +39,7 @@ def bundle(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def test_of_lattice(bundle):
+def broken_lattice(bundle):
     """A test of the lattice itself: the problem, its solution, and what a camera of 0.1 mm/px measures of it."""
     problem = build_model(bundle).problem(F_MAX / 2, DELTA_MAX, frames=STATIONS, cmod_max=0.14 * MM)
     solution = solve(problem)
@@ -69,8 +69,8 @@ def near_points(film, problem):
     return grid[use]
 
 
-def test_levelling_lowers_what_separates_a_lattice_from_its_own_pictures(test_of_lattice, tmp_path):
-    problem, solution, film, found = test_of_lattice
+def test_levelling_lowers_what_separates_a_lattice_from_its_own_pictures(broken_lattice, tmp_path):
+    problem, solution, film, found = broken_lattice
     points = near_points(film, problem)
     leveller = Leveller(film.sheet.view, SETTINGS, points, tmp_path, "test")
     plain = seen(observe_solution(problem, solution, points), film, found, points)
@@ -85,8 +85,8 @@ def test_levelling_lowers_what_separates_a_lattice_from_its_own_pictures(test_of
     assert rms(level[0]) == pytest.approx(rms(plain[0]), rel=0.1)  # before anything parts there is nothing to level
 
 
-def test_levelled_fields_are_kept(test_of_lattice, tmp_path):
-    problem, solution, film, _ = test_of_lattice
+def test_levelled_fields_are_kept(broken_lattice, tmp_path):
+    problem, solution, film, _ = broken_lattice
     points = near_points(film, problem)[::40]
     leveller = Leveller(film.sheet.view, SETTINGS, points, tmp_path, "test")
     first = leveller.seen(problem, solution)
@@ -100,8 +100,8 @@ def test_levelled_fields_are_kept(test_of_lattice, tmp_path):
     assert other.path(problem) != leveller.path(problem) == path
 
 
-def test_the_part_that_is_photographed_is_in_step_with_the_whole(test_of_lattice):
-    _, _, film, _ = test_of_lattice
+def test_the_part_that_is_photographed_is_in_step_with_the_whole(broken_lattice):
+    _, _, film, _ = broken_lattice
     view, grid = film.sheet.view, Grid.over(film.shape, SETTINGS).points
     points = view.point(grid[(grid[:, 0] > 150) & (grid[:, 0] < 230) & (grid[:, 1] > 100) & (grid[:, 1] < 160)])
     part, shape = crop(view, points, SETTINGS)
@@ -113,8 +113,8 @@ def test_the_part_that_is_photographed_is_in_step_with_the_whole(test_of_lattice
     assert np.all(np.array(shape[::-1]) - at.max(axis=0) > 3 * 25)
 
 
-def test_nothing_is_torn_at_rest_but_the_notch(test_of_lattice):
-    problem, solution, film, _ = test_of_lattice
+def test_nothing_is_torn_at_rest_but_the_notch(broken_lattice):
+    problem, solution, film, _ = broken_lattice
     position = problem.particles.position
     torn = film.sheet.torn(np.zeros(position.shape))
     crossing = (position[torn[:, 0], 0] > 0) != (position[torn[:, 1], 0] > 0)
