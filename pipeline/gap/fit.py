@@ -1,0 +1,218 @@
+"""Fit of a candidate: the two parameters always refitted, amplitudes within their bounds, and the evidence for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.special import logsumexp
+
+from pipeline.gap.candidate import Candidate
+from pipeline.gap.metric import Metric
+
+STEP = 1e-3  # of the box, and of an amplitude's scale: central differences
+COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH standard deviations
+STARTS = 3  # nodes along each of two or more amplitudes, to start from
+RULER = {2: 15, 3: 7}  # nodes along each principal axis of so many amplitudes; 5 of more
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """What is explained.
+
+    Parameters
+    ----------
+    target : (n,) array
+    metric : Metric of the same data
+    box : (q, 2) array; bounds of the parameters, their flat prior
+    """
+
+    target: np.ndarray
+    metric: Metric
+    box: np.ndarray
+
+    @property
+    def width(self) -> np.ndarray:
+        return self.box[:, 1] - self.box[:, 0]
+
+    def residual(self, candidate: Candidate, at: np.ndarray) -> np.ndarray:
+        """White target − prediction (n,) at parameters and amplitudes (q + k,)."""
+        q = len(self.box)
+        return self.metric.white(self.target - candidate.predict(at[:q], at[q:]))
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The best point of a candidate, and its posterior on nodes.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    parameters : (q,) array
+    amplitudes : (k,) array
+    chi_square : float
+    log_evidence : float; natural logarithm of ∫∫ likelihood × prior, without the constant that all share
+    nodes : (j, k) array; amplitudes
+    weights : (j,) array, sum 1; their posterior, the parameters integrated out
+    jacobian : (n, q + k) array; white derivatives of the prediction at the best point
+    residual : (n,) array; white
+    at_edge : bool; the parameters lie on the edge of their box
+    """
+
+    candidate: Candidate
+    parameters: np.ndarray
+    amplitudes: np.ndarray
+    chi_square: float
+    log_evidence: float
+    nodes: np.ndarray
+    weights: np.ndarray
+    jacobian: np.ndarray
+    residual: np.ndarray
+    at_edge: bool
+
+    def values(self) -> np.ndarray:
+        """Posterior mean of every effect's value; (effects,)."""
+        return self.weights @ self.candidate.values(self.nodes)
+
+    def interval(self, share: float = 0.95) -> np.ndarray:
+        """Bounds (effects, 2) between which the values lie with this probability."""
+        values = self.candidate.values(self.nodes)
+        tail = (1 - share) / 2
+        return np.array([_quantiles(v, self.weights, (tail, 1 - tail)) for v in values.T]).reshape(-1, 2)
+
+
+def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fitted:
+    """Fit a candidate and integrate its likelihood.
+
+    The parameters are integrated out by Laplace's method at every node of the amplitudes (they are nearly linear), the
+    amplitudes by quadrature over their bounds, nodes lying dense around the best point: so an effect that the data
+    hardly see keeps its prior, and one at its bound is cut there.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    data : Data
+    start : (q,) array; parameters to start from, the middle of the box where not given
+    """
+    centre = data.box.mean(axis=1) if start is None else np.asarray(start, float)
+    k = len(candidate.bounds)
+    best = _climb(candidate, data, np.append(centre, np.zeros(k)))
+    for node in _coarse(candidate, COARSE if k == 1 else STARTS):
+        best = min(best, _climb(candidate, data, np.append(_profiled(best, data), node)), key=lambda f: f[1])
+    at, square, jacobian, residual = best
+    nodes, log_area = _nodes(candidate, data, best)
+    profiles = [_profile(candidate, data, at, node) for node in nodes]
+    log_posterior = np.array([p[0] for p in profiles]) + candidate.log_prior(nodes) + log_area
+    total = float(logsumexp(log_posterior))
+    q = len(data.box)
+    return Fitted(
+        candidate=candidate,
+        parameters=at[:q],
+        amplitudes=at[q:],
+        chi_square=square,
+        log_evidence=total - float(np.log(data.width).sum()),
+        nodes=nodes,
+        weights=np.exp(log_posterior - total),
+        jacobian=jacobian,
+        residual=residual,
+        at_edge=bool(np.any(np.abs(at[:q, None] - data.box) < 1e-6 * data.width[:, None])),
+    )
+
+
+Point = tuple[np.ndarray, float, np.ndarray, np.ndarray]  # parameters and amplitudes, χ², Jacobian, residual
+
+
+def _profiled(point: Point, data: Data) -> np.ndarray:
+    return point[0][: len(data.box)]
+
+
+def _coarse(candidate: Candidate, count: int) -> list[np.ndarray]:
+    lines = [np.linspace(low, high, count + 2)[1:-1] for low, high in candidate.bounds]
+    return [np.array(node) for node in product(*lines)] if lines else []
+
+
+def jacobian(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """White central differences of the prediction with respect to some of its arguments; (n, free)."""
+    q = len(data.box)
+    steps = STEP * np.concatenate([data.width, [min(m.scale, m.high) for m in candidate.components]])
+    columns = []
+    for i in free:
+        low, high = at.copy(), at.copy()
+        low[i], high[i] = at[i] - steps[i], at[i] + steps[i]
+        rise = candidate.predict(high[:q], high[q:]) - candidate.predict(low[:q], low[q:])
+        columns.append(rise / (2 * steps[i]))
+    return data.metric.white(np.column_stack(columns)) if columns else np.zeros((data.target.size, 0))
+
+
+def _climb(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray | None = None, turns: int = 12) -> Point:
+    """Gauss–Newton with bounds and step halving over the free arguments; the prior draws amplitudes to none."""
+    q = len(data.box)
+    free = np.arange(at.size) if free is None else free
+    bounds = np.vstack([data.box, candidate.bounds])
+    pull = np.concatenate([np.zeros(q), [1 / m.scale for m in candidate.components]])
+    residual = data.residual(candidate, at)
+    cost = residual @ residual + np.sum((pull * at) ** 2)
+    slopes = jacobian(candidate, data, at, free)
+    for _ in range(turns):
+        normal = slopes.T @ slopes + np.diag(pull[free] ** 2)
+        normal[np.diag_indices_from(normal)] += 1e-12 * np.trace(normal)
+        step = np.linalg.solve(normal, slopes.T @ residual - pull[free] ** 2 * at[free])
+        for halving in range(6):
+            moved = at.copy()
+            moved[free] = np.clip(at[free] + step / 2**halving, *bounds[free].T)
+            left = data.residual(candidate, moved)
+            now = left @ left + np.sum((pull * moved) ** 2)
+            if now < cost:
+                break
+        else:
+            break
+        gained, at, residual, cost = cost - now, moved, left, now
+        slopes = jacobian(candidate, data, at, free)
+        if gained < 1e-6 * max(1.0, 1e-3 * cost):
+            break
+    return at, float(residual @ residual), slopes, residual
+
+
+def _profile(candidate: Candidate, data: Data, near: np.ndarray, node: np.ndarray) -> tuple[float, np.ndarray]:
+    """log ∫ likelihood over the parameters by Laplace, the amplitudes held at a node; and the best parameters."""
+    q = len(data.box)
+    at, square, slopes, _ = _climb(candidate, data, np.append(near[:q], node), np.arange(q), turns=6)
+    _, determinant = np.linalg.slogdet(slopes.T @ slopes)
+    return -0.5 * square + 0.5 * q * np.log(2 * np.pi) - 0.5 * determinant, at[:q]
+
+
+def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes (j, k) for the quadrature, and the logarithm of the length or area that each stands for."""
+    at, _, slopes, _ = best
+    q, k = len(data.box), len(candidate.bounds)
+    if k == 0:
+        return np.zeros((1, 0)), np.zeros(1)
+    prior = np.concatenate([np.zeros(q), [1 / m.scale**2 for m in candidate.components]])
+    covariance = np.linalg.inv(slopes.T @ slopes + np.diag(prior + 1e-300))[q:, q:]
+    if k == 1:
+        low, high = candidate.bounds[0]
+        fine = at[q] + REACH * np.sqrt(covariance[0, 0]) * np.linspace(-1, 1, FINE)
+        line = np.unique(np.concatenate([np.linspace(low, high, COARSE), fine[(fine > low) & (fine < high)], at[q:]]))
+        return line[:, None], np.log(np.maximum(np.gradient(line) * _ends(line.size), 1e-300))
+    strength, shape = np.linalg.eigh(covariance)
+    axes = shape * np.sqrt(strength)
+    ruler = REACH * np.linspace(-1, 1, RULER.get(k, 5))
+    grid = np.array(list(product(ruler, repeat=k))) @ axes.T + at[q:]
+    inside = np.all((grid >= candidate.bounds[:, 0]) & (grid <= candidate.bounds[:, 1]), axis=1)
+    nodes = grid[inside] if inside.any() else at[None, q:]
+    area = k * np.log(ruler[1] - ruler[0]) + 0.5 * np.log(strength).sum()
+    return nodes, np.full(len(nodes), area)
+
+
+def _ends(count: int) -> np.ndarray:
+    """Half a step at either end: trapezoids."""
+    weight = np.ones(count)
+    weight[[0, -1]] = 0.5
+    return weight
+
+
+def _quantiles(values: np.ndarray, weights: np.ndarray, shares: tuple[float, float]) -> list[float]:
+    order = np.argsort(values)
+    passed = np.cumsum(weights[order]) - 0.5 * weights[order]
+    return [float(np.interp(share, passed, values[order])) for share in shares]

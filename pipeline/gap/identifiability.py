@@ -1,0 +1,153 @@
+"""What could be told apart, before anything is judged: detectability, detection limits, equivalence classes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
+
+from pipeline.gap.candidate import Candidate
+from pipeline.gap.fit import Data, jacobian
+
+DETECTED = 3.0  # d′ from which an effect counts as detectable: one wrong in 700 either way, none of twenty by chance
+APART = 2.0  # d′ that must remain against a competitor for two effects to be told apart
+OFTEN = 4.0  # detection limits at which classes are looked at, capped at the plausible maximum
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """The identifiability of effects in one test.
+
+    Parameters
+    ----------
+    names : tuple of n effects, sorted
+    limit : (n,) array; value from which an effect is detected, inf where no plausible one is
+    d_prime : (n,) array; at the plausible maximum, (f_max, δ_max) refitted
+    looked_at : (n,) array; value at which effects are held against each other
+    remaining : (n, n) array; d′ of the row's effect at that value after the column's effect has been refitted too
+    classes : tuple of tuples of names; detectable effects that these data do not tell apart
+    """
+
+    names: tuple[str, ...]
+    limit: np.ndarray
+    d_prime: np.ndarray
+    looked_at: np.ndarray
+    remaining: np.ndarray
+    classes: tuple[tuple[str, ...], ...]
+
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """Effects of which no plausible size would be detected."""
+        return tuple(n for n, limit in zip(self.names, self.limit, strict=True) if not np.isfinite(limit))
+
+    def class_of(self, name: str) -> tuple[str, ...]:
+        """The class of an effect, itself alone where it has no mates."""
+        return next((c for c in self.classes if name in c), (name,))
+
+
+@dataclass(frozen=True, eq=False)
+class _Signal:
+    """What is left of an effect after the refit of the parameters, along each of its directions and signs."""
+
+    candidate: Candidate
+    data: Data
+    at: np.ndarray
+    none: np.ndarray
+    slopes: np.ndarray  # orthonormal (n, q)
+
+    def of(self, amplitudes: np.ndarray) -> np.ndarray:
+        change = self.data.metric.white(self.candidate.predict(self.at, amplitudes) - self.none)
+        return change - self.slopes @ (self.slopes.T @ change)
+
+    def weakest(self, value: float) -> np.ndarray:
+        """Of all directions and signs that a size allows, the change that is seen least."""
+        return min(self.all(value), key=np.linalg.norm)
+
+    def all(self, value: float) -> list[np.ndarray]:
+        """Changes for every direction and sign of a size."""
+        size = self.candidate.magnitudes[0]
+        if size.directions == 2:
+            along = [self.of(value * np.eye(2)[i]) for i in (0, 1)]
+            _, _, right = np.linalg.svd(np.column_stack(along), full_matrices=False)
+            return [self.of(value * row) for row in right]
+        return [self.of(np.array([sign * value])) for sign in (1, -1) if size.low <= sign * value <= size.high]
+
+
+def card(candidates: Mapping[str, Candidate], data: Data, parameters: np.ndarray, temperature: float = 1.0) -> Card:
+    """What could be told apart at these parameters.
+
+    d′ = ‖(I − P) L⁻¹ Δy‖ with Δy the change of the data by the effect and P the projector onto what a change of
+    (f_max, δ_max) does (Macmillan and Creelman 2005, for the ideal observer of a known signal). Tempering divides by
+    √temperature. Against a competitor its best amplitude, within its bounds, is taken off too; the change is taken as
+    linear in that amplitude.
+
+    Parameters
+    ----------
+    candidates : name → Candidate of that one effect
+    data : Data; only metric and box are used
+    parameters : (q,) array
+    temperature : float
+    """
+    names = tuple(sorted(candidates))
+    signals = [_signal(candidates[n], data, parameters) for n in names]
+    root = np.sqrt(temperature)
+    largest = np.array([s.candidate.magnitudes[0].high for s in signals])
+    d_prime = np.array([np.linalg.norm(s.weakest(m)) for s, m in zip(signals, largest, strict=True)]) / root
+    limit = np.array([_limit(s, m, root) for s, m in zip(signals, largest, strict=True)])
+    at = np.where(np.isfinite(limit), np.minimum(OFTEN * np.where(np.isfinite(limit), limit, 0), largest), largest)
+    changes = [s.all(v) for s, v in zip(signals, at, strict=True)]
+    remaining = np.array([[_remaining(c, s) for s in signals] for c in changes]) / root
+    np.fill_diagonal(remaining, 0.0)
+    return Card(names, limit, d_prime, at, remaining, _classes(names, limit, remaining))
+
+
+def _signal(candidate: Candidate, data: Data, parameters: np.ndarray) -> _Signal:
+    none = np.zeros(len(candidate.bounds))
+    at = np.append(parameters, none)
+    slopes = np.linalg.qr(jacobian(candidate, data, at, np.arange(len(data.box))))[0]
+    return _Signal(candidate, data, parameters, candidate.predict(parameters, none), slopes)
+
+
+def _limit(signal: _Signal, largest: float, root: float) -> float:
+    """The smallest size with d′ = `DETECTED`, by bisection; inf where even the largest has less."""
+
+    def seen(value: float) -> bool:
+        return bool(np.linalg.norm(signal.weakest(value)) >= DETECTED * root)
+
+    if not seen(largest):
+        return float("inf")
+    low, high = 0.0, largest
+    while high - low > 1e-3 * high:
+        middle = (low + high) / 2
+        low, high = (low, middle) if seen(middle) else (middle, high)
+    return high
+
+
+def _remaining(changes: list[np.ndarray], competitor: _Signal) -> float:
+    """The least that a competitor leaves of any of these changes."""
+    size = competitor.candidate.magnitudes[0]
+    found = []
+    for change in changes:
+        if size.directions == 2:
+            basis = np.column_stack([competitor.of(size.high * row) for row in np.eye(2)])
+            found.append(np.linalg.norm(change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]))
+            continue
+        for trial in competitor.all(size.high):
+            power = float(trial @ trial)
+            share = np.clip(trial @ change / power, 0.0, 1.0) if power > 0 else 0.0
+            found.append(np.linalg.norm(change - share * trial))
+    return float(min(found))
+
+
+def _classes(names: tuple[str, ...], limit: np.ndarray, remaining: np.ndarray) -> tuple[tuple[str, ...], ...]:
+    """Detectable effects in groups of which no two are told apart (complete linkage: no chains)."""
+    seen = np.flatnonzero(np.isfinite(limit))
+    if seen.size < 2:
+        return ()
+    apart = np.maximum(remaining, remaining.T)[np.ix_(seen, seen)]
+    group = fcluster(linkage(squareform(apart, checks=False), "complete"), APART, "distance")
+    found = [tuple(names[i] for i in seen[group == g]) for g in np.unique(group)]
+    return tuple(sorted(c for c in found if len(c) > 1))

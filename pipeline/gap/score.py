@@ -1,0 +1,92 @@
+"""From evidence to probabilities: prior odds, temper, pooling of replicates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+NONE = "none"
+P_NONE = 0.5  # before anything is seen
+
+
+@dataclass(frozen=True)
+class Scored:
+    """What the data say of every candidate.
+
+    Parameters
+    ----------
+    log_bayes : label → natural logarithm of the Bayes factor against none, before tempering
+    probability : label → probability after tempering, sum 1
+    temperature : float
+    """
+
+    log_bayes: Mapping[str, float]
+    probability: Mapping[str, float]
+    temperature: float
+
+    def ranked(self) -> list[str]:
+        """Labels, the most probable first."""
+        return sorted(self.probability, key=lambda label: (-self.probability[label], label))
+
+    def credible(self, share: float = 0.9) -> list[str]:
+        """The fewest labels whose probabilities sum to the share."""
+        found, total = [], 0.0
+        for label in self.ranked():
+            found.append(label)
+            total += self.probability[label]
+            if total >= share - 1e-12:
+                break
+        return found
+
+
+def inclusion(effects: int) -> float:
+    """Prior odds of one effect where each of so many is there or not by itself, and none with `P_NONE`.
+
+    (1 + odds)^−effects = P_NONE; a pair then has the odds of its members multiplied.
+    """
+    return float(P_NONE ** (-1 / max(effects, 1)) - 1)
+
+
+def score(
+    log_evidence: Mapping[str, float], members: Mapping[str, int], effects: int, temperature: float = 1.0
+) -> Scored:
+    """Probabilities of candidates.
+
+    Parameters
+    ----------
+    log_evidence : label → from `fit`; must hold "none"
+    members : label → how many effects it has
+    effects : int; in the library, tested
+    temperature : float, at least 1; log Bayes factors are divided by it: what simulators leave is less independent
+        than Σ says (calibrated on tests of another engine)
+    """
+    log_bayes = {label: log_evidence[label] - log_evidence[NONE] for label in log_evidence}
+    return from_bayes(log_bayes, members, effects, temperature)
+
+
+def from_bayes(
+    log_bayes: Mapping[str, float], members: Mapping[str, int], effects: int, temperature: float = 1.0
+) -> Scored:
+    """Probabilities from log Bayes factors; arguments as of `score`."""
+    odds = np.log(inclusion(effects))
+    weight = np.array([log_bayes[label] / temperature + members[label] * odds for label in log_bayes])
+    share = np.exp(weight - weight.max())
+    share /= share.sum()
+    return Scored(dict(log_bayes), dict(zip(log_bayes, share.tolist(), strict=True)), temperature)
+
+
+def pooled(replicates: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """The median log Bayes factor of every candidate that all replicates have.
+
+    Not the sum: what one engine leaves out for all specimens alike would be counted as often as there are specimens.
+    """
+    common = set.intersection(*(set(r) for r in replicates))
+    return {label: float(np.median([r[label] for r in replicates])) for label in replicates[0] if label in common}
+
+
+def pairs(singles: Scored, best: int = 3) -> list[tuple[str, str]]:
+    """The pairs of the most probable single effects."""
+    top = [label for label in singles.ranked() if label != NONE][:best]
+    return [(a, b) for i, a in enumerate(top) for b in top[i + 1 :]]

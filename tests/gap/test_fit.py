@@ -1,0 +1,89 @@
+"""The evidence against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.gap.candidate import Candidate
+from pipeline.gap.effect import Magnitude
+from pipeline.gap.fit import Data, fit
+from pipeline.gap.metric import Metric
+from tests.gap.linear import BOX, WIDE, candidate, covariance, data, exact_log_bayes, none
+
+
+def scene(seed: int, size: float = 1.0):
+    rng = np.random.default_rng(seed)
+    n = 40
+    base, column, sigma = rng.normal(size=(n, 2)), rng.normal(size=n), covariance(n, rng)
+    target = base @ [1.0, -2.0] + size * column + np.linalg.cholesky(sigma) @ rng.normal(size=n)
+    return base, column, sigma, target
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("size", [0.0, 0.3, 3.0])
+def test_the_bayes_factor_of_a_linear_effect_is_the_exact_one(seed, size):
+    base, column, sigma, target = scene(seed, size)
+    given = data(target, sigma)
+    found = fit(candidate(base, "x", column), given).log_evidence - fit(none(base), given).log_evidence
+    exact = exact_log_bayes(target, sigma, base, column, WIDE.scale)
+    assert found == pytest.approx(exact, abs=0.01)  # trapezoids of 0.42 standard deviations, cut at five
+
+
+def test_the_posterior_of_a_linear_effect_is_the_exact_one():
+    base, column, sigma, target = scene(3, 2.0)
+    found = fit(candidate(base, "x", column), data(target, sigma))
+    design, inverse = np.column_stack([base, column]), np.linalg.inv(sigma)
+    precision = design.T @ inverse @ design + np.diag([0, 0, 1 / WIDE.scale**2])
+    mean = np.linalg.solve(precision, design.T @ inverse @ target)
+    std = np.sqrt(np.linalg.inv(precision)[2, 2])
+    assert found.values()[0] == pytest.approx(mean[2], abs=0.01 * std)  # quadrature
+    assert np.allclose(found.amplitudes, mean[2], atol=1e-4 * std)  # Gauss–Newton is exact in one step
+    low, high = found.interval()[0]
+    assert (high - low) / 2 == pytest.approx(1.96 * std, rel=0.03)  # quantiles between nodes 0.42 std apart
+
+
+def test_two_effects_at_once_have_the_exact_evidence():
+    base, column, sigma, target = scene(5, 1.0)
+    other = np.random.default_rng(9).normal(size=column.size)
+    both = Candidate(("x", "z"), (WIDE, WIDE), lambda p, a: base @ p + column * a[0] + other * a[1])
+    given = data(target, sigma)
+    found = fit(both, given).log_evidence - fit(none(base), given).log_evidence
+    first = exact_log_bayes(target, sigma, base, column, WIDE.scale)
+    with_first = sigma + WIDE.scale**2 * np.outer(column, column)
+    exact = first + exact_log_bayes(target, with_first, base, other, WIDE.scale)
+    assert found == pytest.approx(exact, abs=0.02)  # midpoints 0.7 standard deviations apart
+
+
+def test_an_effect_that_data_do_not_see_keeps_its_prior():
+    base, column, sigma, target = scene(1)
+    size = Magnitude(0.0, 2.0, 1e6, "1")  # flat between the bounds
+    found = fit(candidate(base, "x", 0 * column, size), data(target, sigma))
+    assert found.log_evidence == pytest.approx(fit(none(base), data(target, sigma)).log_evidence, abs=1e-6)
+    assert np.allclose(found.interval()[0], (0.05, 1.95), atol=0.04)  # thirteen nodes over the range
+
+
+def test_amplitudes_stay_within_their_bounds():
+    base, column, sigma, target = scene(2, 5.0)
+    size = Magnitude(0.0, 1.0, 1e6, "1")
+    found = fit(candidate(base, "x", column, size), data(target, sigma))
+    assert found.amplitudes[0] == pytest.approx(1.0)
+    assert found.nodes.max() <= 1.0
+
+
+def test_a_curved_effect_is_found_from_the_far_side():
+    rng = np.random.default_rng(4)
+    t = np.linspace(0, 1, 60)
+    base = np.column_stack([np.ones_like(t), t])
+    bent = Candidate(("x",), (Magnitude(-3, 3, 1e6, "1"),), lambda p, a: base @ p + np.sin(4 * a[0] * t))
+    target = bent.predict(np.array([0.5, -1.0]), np.array([2.0])) + 0.05 * rng.normal(size=t.size)
+    found = fit(bent, Data(target, Metric(0.05**2 * np.eye(t.size)), BOX))
+    assert found.amplitudes[0] == pytest.approx(2.0, abs=0.05)  # ten times its standard deviation
+
+
+def test_the_order_of_data_does_not_matter():
+    base, column, sigma, target = scene(7)
+    order = np.random.default_rng(0).permutation(target.size)
+    one = fit(candidate(base, "x", column), data(target, sigma))
+    two = fit(candidate(base[order], "x", column[order]), data(target[order], sigma[np.ix_(order, order)]))
+    assert one.log_evidence == pytest.approx(two.log_evidence, abs=1e-8)  # round-off of two factorisations
