@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from pipeline.core.clock import Clock
 from pipeline.core.curve import LoadCurve
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.specimen import Specimen
@@ -28,10 +29,11 @@ class Role(StrEnum):
     GUIDE = "guide"  # held; only stops rigid motion
 
 
-class CohesiveLaw(Protocol):
-    """What every engine may ask of a bond law; arrays are (m,), one entry a bond.
+class BondLaw(Protocol):
+    """What everybody may ask of the law of the bonds; arrays are (m,), one entry a bond.
 
-    k_n in N/m, f_max in N (inf: takes no damage), delta_max in m, delta_peak in m.
+    k_n in N/m, f_max in N (inf: takes no damage), delta_max in m, delta_peak in m; delta_end in m, the opening at which
+    nothing is left. `dissipated`: J, as if the bond had been opened to `reached` (m) and nothing else.
     """
 
     @property
@@ -42,9 +44,16 @@ class CohesiveLaw(Protocol):
     def delta_max(self) -> np.ndarray: ...
     @property
     def delta_peak(self) -> np.ndarray: ...
+    @property
+    def delta_end(self) -> np.ndarray: ...
+    def dissipated(self, reached: np.ndarray) -> np.ndarray: ...
+
+
+class CohesiveLaw(BondLaw, Protocol):
+    """A law whose force depends on the opening now and the largest one seen, and on nothing else."""
+
     def force(self, opening: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
     def stored(self, opening: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
-    def dissipated(self, reached: np.ndarray) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ class Problem:
     specimen : Specimen
     particles : Particles
     bonds : Bonds
-    law : CohesiveLaw with one entry a bond
+    law : BondLaw with one entry a bond: a CohesiveLaw, or one with sliding or creep
     grips : tuple of Grip
     gauge : Gauge
     kinematics : Kinematics
@@ -111,12 +120,13 @@ class Problem:
     stations : (k,) array, m, increasing; CMOD values at which a full field is wanted
     accuracy : float; quasi-static error asked for, relative, in load and displacement
     cmod_rate : float, m/s; gives simulated curves their time
+    clock : Clock or None; the test's own time, for laws that creep
     """
 
     specimen: Specimen
     particles: Particles
     bonds: Bonds
-    law: CohesiveLaw
+    law: BondLaw
     grips: tuple[Grip, ...]
     gauge: Gauge
     kinematics: Kinematics
@@ -124,8 +134,9 @@ class Problem:
     stations: np.ndarray
     accuracy: float = 0.01
     cmod_rate: float = 1e-5
+    clock: Clock | None = None
 
-    def with_law(self, law: CohesiveLaw) -> Problem:
+    def with_law(self, law: BondLaw) -> Problem:
         """The same specimen and test with other bonds' properties."""
         return replace(self, law=law)
 

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.core.problem import CohesiveLaw, Problem
 from pipeline.equilibrium.constraints import Constraints
 from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
+from pipeline.materials.cohesive import central_law
 
 
 class Model(Protocol):
@@ -55,7 +56,9 @@ def whole_model(problem: Problem) -> WholeModel:
     weight = np.zeros(constraints.drive.size)
     np.add.at(weight, 2 * problem.gauge.index, problem.gauge.weight)
     drive = float(weight @ constraints.drive)
-    return WholeModel(problem.law, network, constraints, constraints.expand.T @ weight, drive)
+    return WholeModel(
+        central_law(problem.law, "equilibrium"), network, constraints, constraints.expand.T @ weight, drive
+    )
 
 
 @dataclass(frozen=True)

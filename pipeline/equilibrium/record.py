@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.core.curve import LoadCurve
 from pipeline.core.problem import EnergyBalance, Problem, Solution
 from pipeline.equilibrium.model import State
+from pipeline.materials.cohesive import central_law
 
 Fields = Callable[[State], np.ndarray]
 
@@ -57,7 +58,7 @@ class Record:
     def energy(self, state: State) -> EnergyBalance:
         """Work of the machine by trapezoids against what is stored and used up in the last state."""
         machine, _, load = np.asarray(self.rows).T
-        law = self.problem.law
+        law = central_law(self.problem.law, "equilibrium")
         return EnergyBalance(
             external=float(np.trapezoid(load, machine)),
             stored=float(law.stored(state.opening, state.reached).sum()),

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.core.errors import UnavailableError
 from pipeline.core.particles import Phase
 from pipeline.core.problem import Problem
+from pipeline.materials.cohesive import LinearSoftening
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class LawTable:
 def law_table(problem: Problem) -> LawTable:
     """Collect the distinct bond properties of a problem."""
     law = problem.law
+    if not isinstance(law, LinearSoftening):
+        raise UnavailableError(f"the LAMMPS engine does not follow {type(law).__name__} in this version")
     elastic = np.isinf(law.f_max)
     delta_max = np.where(elastic, np.inf, law.delta_max)
     rows, index = np.unique(np.column_stack([law.k_n, law.f_max, delta_max]), axis=0, return_inverse=True)

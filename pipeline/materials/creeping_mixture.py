@@ -51,7 +51,9 @@ def creeping_law(
     force, opening = mixture.strength(bonds.phase, f_max, delta_max)
     free = ~bonds.protected
     rise = creeping_arms(mixture, mastic, bonds.phase, thickness)
-    return CreepingSoftening(rise, np.where(free, force, np.inf), np.where(free, opening, np.inf))
+    return CreepingSoftening(
+        rise, np.where(free, force, np.inf), np.where(free, opening, np.inf), mixture.softening, mixture.unloading
+    )
 
 
 def _row(series: PronySeries) -> tuple[np.ndarray, np.ndarray, float]:

@@ -2,8 +2,9 @@
 
 Hill et al. 2017, "Discrete Element Modeling": the viscoelastic bond differs from the elastic one before its peak
 only. Below f_max the force is that of the Maxwell arms, whatever the opening. Where it first reaches f_max, at
-an opening δ*, softening begins: a straight line from (δ*, f_max) to (δ_max, 0), creep stops, unloading goes to the
-origin along the secant. A bond with δ* ≥ δ_max breaks at once. Undamaged bonds creep in compression too; damaged
+an opening δ*, softening begins: from (δ*, f_max), a straight line to (δ_max, 0) or another shape g(s) along
+s = (δ − δ*)/(δ_max − δ*); creep stops, unloading goes to the origin along the secant, or elastically with K(0) down to
+a plastic opening. A bond with δ* ≥ δ_max breaks at once. Undamaged bonds creep in compression too; damaged
 ones are elastic there, with K(0), and so carry no tension while they are closed, wherever δ* lay.
 
 Within one step of physical time Δt the force is a function of the opening at its end alone,
@@ -21,7 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import InputError
+from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.relaxation import Arms, crept, history_force, relax, stored, tangent, total
+from pipeline.materials.softening import LINEAR, Softening, Unloading
 
 
 @dataclass(frozen=True)
@@ -49,20 +52,25 @@ class BondState:
 
 @dataclass(frozen=True)
 class CreepingSoftening:
-    """Linear softening behind a creeping rise; one entry a bond.
+    """Softening behind a creeping rise; one entry a bond.
 
     Parameters
     ----------
     rise : Arms; K(t), in N/m
     f_max : (m,) array, N, positive; inf: the bond takes no damage
-    delta_max : (m,) array, m, positive; ignored where f_max is inf
+    delta_max : (m,) array, m, positive; ignored where f_max is inf. Where the *linear* branch of the same area ends
+    softening : Softening
+    unloading : Unloading
     """
 
     rise: Arms
     f_max: np.ndarray
     delta_max: np.ndarray
+    softening: Softening = LINEAR
+    unloading: Unloading = Unloading.SECANT
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "unloading", Unloading(self.unloading))
         f_max, delta_max = np.asarray(self.f_max, float), np.asarray(self.delta_max, float)
         _refuse("f_max", f_max, f_max > 0, self.rise)
         _refuse("delta_max", delta_max, (delta_max > 0) | ~np.isfinite(f_max), self.rise)
@@ -98,18 +106,75 @@ class CreepingSoftening:
             reached=np.where(softening, np.maximum(opening, state.reached), 0.0),
         )
 
+    @property
+    def k_n(self) -> np.ndarray:
+        """K(0) (m,), N/m."""
+        return self.rise.instantaneous
+
+    @property
+    def delta_peak(self) -> np.ndarray:
+        """f_max/K(0) (m,), m: where softening would begin without any creep."""
+        return self.f_max / self.rise.instantaneous
+
+    @property
+    def without_creep(self) -> CentralSoftening:
+        """The law of steps that take no time."""
+        return CentralSoftening(self.k_n, self.f_max, self.delta_max, self.softening, self.unloading)
+
+    @property
+    def delta_end(self) -> np.ndarray:
+        """Opening (m,), m, from which on a bond that never crept is broken; inf where it takes no damage."""
+        return self.without_creep.delta_end
+
+    def dissipated(self, reached: np.ndarray) -> np.ndarray:
+        """Energy (m,), J, used up by bonds that never crept; `used` has that of the true path."""
+        return self.without_creep.dissipated(reached)
+
+    def way(self, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """s (m,) of softened bonds at their largest opening; the end where δ* ≥ δ_max, 0 for undamaged ones."""
+        some = np.isfinite(onset) & np.isfinite(self.delta_max)
+        length = np.subtract(self.delta_max, onset, out=np.ones_like(onset), where=some)
+        gone = np.subtract(reached, onset, out=np.zeros_like(onset), where=some)
+        way = np.divide(gone, length, out=np.full_like(onset, self.softening.end), where=length > 0)
+        return np.where(some, np.maximum(way, 0.0), 0.0)
+
     def envelope(self, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """Force (m,), N, of softened bonds at their largest opening; 0 for those with δ* ≥ δ_max."""
-        some = np.isfinite(onset) & np.isfinite(self.delta_max)
-        way = np.subtract(self.delta_max, onset, out=np.zeros_like(onset), where=some)
-        rest = np.subtract(self.delta_max, reached, out=np.zeros_like(onset), where=some)
-        left = np.divide(rest, way, out=np.zeros_like(way), where=way > 0)
-        return np.where(np.isfinite(self.f_max), self.f_max, 0.0) * np.clip(left, 0.0, 1.0)
+        left = self.softening.left(self.way(reached, onset))
+        return np.where(np.isfinite(self.f_max) & np.isfinite(onset), self.f_max, 0.0) * left
+
+    def broken(self, state: BondState) -> np.ndarray:
+        """Which bonds carry nothing any more; (m,) bool."""
+        return state.softened & (self.way(state.reached, state.onset) >= self.softening.end)
+
+    def equivalent(self, state: BondState) -> np.ndarray:
+        """The largest opening (m,), m, at which a bond that never crept would be as far along its branch; 0 before."""
+        some = state.softened & np.isfinite(self.f_max)
+        peak, last = np.where(some, self.delta_peak, 0.0), np.where(some, self.delta_max, 0.0)
+        way = np.minimum(self.way(state.reached, state.onset), self.softening.end)
+        return np.where(some, np.where(self.broken(state), self.delta_end, peak + way * (last - peak)), 0.0)
 
     def stored(self, state: BondState) -> np.ndarray:
-        """Recoverable energy (m,), J: of the arms' springs, or half of force times opening once softened."""
+        """Recoverable energy (m,), J: of the arms' springs; once softened ½ f δ, or f²/(2 K(0)) if elastic."""
         force = self._softened(state.opening, state.reached, state.onset)
-        return np.where(state.softened, 0.5 * state.opening * force, stored(self.rise, state.arms, state.opening))
+        half = force / self.k_n if self.unloading is Unloading.ELASTIC else state.opening
+        return np.where(state.softened, 0.5 * half * force, stored(self.rise, state.arms, state.opening))
+
+    def used(self, before: BondState, after: BondState, duration: float) -> np.ndarray:
+        """Energy (m,), J, that bonds use up from one state to the next: work less what is stored.
+
+        Of dashpots and of softening exactly for openings that grow linearly in time; where softening begins within
+        the step, the work up to there is that of a straight line. What a bond gives back by unloading to the origin
+        instead of along K(0) is counted as negative there: δ* is larger than f_max/K(0) by the creep.
+        """
+        creep = self.crept(before, after.opening, duration)
+        further = self._softening_work(after) - np.where(before.softened, self._softening_work(before), 0.0)
+        force = total(self.rise, before.arms, before.opening)
+        onset = np.where(after.softened, after.onset, 0.0)
+        strength = np.where(np.isfinite(self.f_max), self.f_max, 0.0)
+        rise = stored(self.rise, before.arms, before.opening) + 0.5 * (force + strength) * (onset - before.opening)
+        starts = after.softened & ~before.softened
+        return np.where(after.softened, further + np.where(starts, rise, 0.0), creep)
 
     def crept(self, state: BondState, opening: np.ndarray, duration: float) -> np.ndarray:
         """Energy (m,), J, that the dashpots of bonds not softened use up in a step."""
@@ -117,12 +182,25 @@ class CreepingSoftening:
         return np.where(state.softened | (opening >= self.onset(state, duration)), 0.0, used)
 
     def _softened(self, opening: np.ndarray, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
-        """Force (m,), N, of softened bonds: secant in tension, K(0) in compression."""
+        """Force (m,), N, of softened bonds: secant or elastic in tension, K(0) in compression."""
         pulled = opening > 0
-        secant = np.divide(
-            self.envelope(reached, onset), reached, out=np.zeros_like(self.delta_max), where=pulled & (reached > 0)
-        )
-        return opening * np.where(pulled, secant, self.rise.instantaneous)
+        envelope = self.envelope(reached, onset)
+        if self.unloading is Unloading.ELASTIC:
+            tension = np.maximum(envelope - self.k_n * (reached - opening), 0.0)
+        else:
+            share = np.divide(opening, reached, out=np.zeros_like(self.delta_max), where=pulled & (reached > 0))
+            tension = share * envelope
+        return np.where(pulled, tension, self.k_n * opening)
+
+    def _softening_work(self, state: BondState) -> np.ndarray:
+        """Area of the branch from δ* to the largest opening, less what is stored there (m,), J; 0 if not softened."""
+        some = state.softened & np.isfinite(self.f_max)
+        onset, last = np.where(some, state.onset, 0.0), np.where(some, self.delta_max, 0.0)
+        way = np.maximum(last - onset, 0.0)
+        area = np.where(some, self.f_max, 0.0) * way * self.softening.area(self.way(state.reached, state.onset))
+        envelope = self.envelope(state.reached, state.onset)
+        top = envelope / self.k_n if self.unloading is Unloading.ELASTIC else state.reached
+        return np.where(some, area - 0.5 * envelope * top, 0.0)
 
 
 def _refuse(name: str, values: np.ndarray, good: np.ndarray, rise: Arms) -> None:

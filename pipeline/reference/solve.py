@@ -13,6 +13,7 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.explicit.frames import Frame
 from pipeline.explicit.loading import Loading, loading_rule
 from pipeline.explicit.modes import lowest_modes
+from pipeline.materials.cohesive import central_law
 from pipeline.reference.body import Body, body_of
 from pipeline.reference.drive import Drive, Energies
 from pipeline.reference.record import Record, Window, row
@@ -96,7 +97,7 @@ class Run:
 
     def _finish_window(self) -> None:
         """Take the means, measure the lag, choose the speed, note a row and, past a station, a frame."""
-        n, law, state = self.window.steps, self.problem.law, self.state
+        n, law, state = self.window.steps, central_law(self.problem.law, "reference"), self.state
         stored, used = law.stored(state.opening, state.reached).sum(), law.dissipated(state.reached).sum()
         kinetic = _kinetic(self.body, state)
         self.energy = replace(self.energy, stored=float(stored), dissipated=float(used), kinetic=kinetic)

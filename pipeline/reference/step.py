@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.problem import Grip
+from pipeline.materials.cohesive import central_law
 from pipeline.reference.body import Body
 
 
@@ -61,7 +62,7 @@ def at_rest_place(body: Body, velocity: np.ndarray) -> State:
 def with_bond_forces(body: Body, state: State) -> State:
     """The state with openings, history and forces that belong to its positions."""
     opening, direction = body.bonds_at(state.position)
-    tension = body.problem.law.force(opening, state.reached)
+    tension = central_law(body.problem.law, "reference").force(opening, state.reached)
     reached = np.maximum(opening, state.reached)
     return replace(state, force=body.forces(tension, direction), opening=opening, reached=reached)
 

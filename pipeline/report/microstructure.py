@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Patch
 
 from pipeline.core.particles import Bonds, Particles, Phase
-from pipeline.core.problem import CohesiveLaw, Problem
+from pipeline.core.problem import BondLaw, Problem
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.report.style import BLACK, DAMAGE, PHASE_COLOURS, colour_bar, disks, outline, specimen_axes
@@ -84,7 +84,7 @@ def bond_damage(
     return axes
 
 
-def softening(law: CohesiveLaw, reached: np.ndarray) -> np.ndarray:
+def softening(law: BondLaw, reached: np.ndarray) -> np.ndarray:
     """(κ − δ_peak)/(δ_max − δ_peak) of every bond (m,), between 0 and 1; 0 where a bond takes no damage."""
     soft = np.isfinite(law.f_max) & np.isfinite(law.delta_max) & (law.delta_max > law.delta_peak)
     peak = np.where(soft, law.delta_peak, 0.0)

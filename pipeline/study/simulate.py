@@ -98,7 +98,7 @@ def test_result(problem: Problem, solution: Solution, points: np.ndarray, seen: 
         **cmod_energy(curve, problem.specimen),
         "particles": problem.particles.count,
         "bonds": problem.bonds.count,
-        "broken_bonds": int(np.count_nonzero(solution.reached >= problem.law.delta_max)),
+        "broken_bonds": int(np.count_nonzero(solution.reached >= problem.law.delta_end)),
         "by_phase": breakage(problem, solution),
         "steps": solution.steps,
         "quasi_static_error": solution.quasi_static_error,
@@ -128,7 +128,7 @@ def cmod_energy(curve: LoadCurve, specimen: Specimen) -> dict[str, Any]:
 
 def breakage(problem: Problem, solution: Solution) -> dict[str, dict[str, float]]:
     """Broken bonds and dissipated energy of each phase of bonds: what the crack had to break."""
-    broken = solution.reached >= problem.law.delta_max
+    broken = solution.reached >= problem.law.delta_end
     spent = problem.law.dissipated(solution.reached)
     return {
         Phase(phase).name.lower(): {

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.errors import InputError
-from pipeline.materials.cohesive import LinearSoftening
+from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
+from pipeline.materials.softening import LINEAR, Shape, Softening, Unloading
 
 K, F, D = 4.0e8, 80.0, 1.0e-6  # δ_peak = 0.2 µm, softening over 0.8 µm
 LAW = LinearSoftening(np.array([K]), np.array([F]), np.array([D]))
@@ -114,3 +115,86 @@ def test_scaling_law(law: LinearSoftening, s: float, opening: float, reached: fl
 def test_refusals(values: tuple[float, float, float], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         LinearSoftening(*(one(v) for v in values))
+
+
+SHAPES = [LINEAR, Softening(Shape.EXPONENTIAL), Softening(Shape.BILINEAR_TAIL), Softening(Shape.BILINEAR_TAIL, 0.5)]
+shaped = st.builds(
+    lambda k, f, stretch, shape, unloading: CentralSoftening(one(k), one(f), one(stretch * f / k), shape, unloading),
+    st.floats(1e6, 1e10),
+    st.floats(1e-2, 1e4),
+    st.floats(1.01, 1e4),
+    st.sampled_from(SHAPES),
+    st.sampled_from(Unloading),
+)
+
+
+@pytest.mark.parametrize(
+    ("shape", "unloading", "opening", "reached", "force"),
+    [
+        # K 4e8, F 80, δ_peak 0.2 µm, δ_max 1 µm: s = (δ − 0.2)/0.8
+        (Softening(Shape.BILINEAR_TAIL), "secant", 5.2e-7, 0.0, 80 / 3),  # the kink, s = 0.4
+        (Softening(Shape.BILINEAR_TAIL), "secant", 2.6e-7, 5.2e-7, 40 / 3),
+        (Softening(Shape.BILINEAR_TAIL), "elastic", 5.0e-7, 5.2e-7, 80 / 3 - 8),
+        (Softening(Shape.BILINEAR_TAIL), "elastic", 4.0e-7, 5.2e-7, 0.0),  # plastic opening: 0.52 − 0.0667 µm
+        (Softening(Shape.BILINEAR_TAIL), "elastic", -1e-7, 5.2e-7, -40.0),
+        (LINEAR, "elastic", 5.5e-7, 6e-7, 20.0),
+        (LINEAR, "elastic", 6e-7, 6e-7, 40.0),
+        (LINEAR, "elastic", 7e-7, 6e-7, 30.0),
+        (Softening(Shape.EXPONENTIAL), "secant", 3.5e-6, 0.0, 0.0),  # s = 4.125: past its end
+    ],
+)
+def test_force_opening_table_of_options(
+    shape: Softening, unloading: str, opening: float, reached: float, force: float
+) -> None:
+    law = CentralSoftening(one(K), one(F), one(D), shape, Unloading(unloading))
+    assert law.force(one(opening), one(reached))[0] == pytest.approx(force, abs=1e-12 * F)  # round-off
+
+
+@given(shaped)
+def test_breaking_uses_the_same_energy_whatever_the_shape(law: CentralSoftening) -> None:
+    area = 0.5 * law.f_max * law.delta_max
+    assert law.dissipated(2 * law.delta_end) == pytest.approx(area, rel=1e-13)  # a product and three sums
+    assert law.damage(law.delta_end) == pytest.approx(1, abs=1e-12)  # rounding of the end over a way of 0.01 δ_peak
+    assert law.softened_share(law.delta_end) == pytest.approx(1, rel=1e-12)  # as before, over a small difference
+
+
+@settings(max_examples=40, deadline=None)
+@given(shaped, paths)
+def test_work_of_any_shape_is_stored_plus_dissipated(law: CentralSoftening, path: list[float]) -> None:
+    """Gauss quadrature between the corners of the law."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    work, before, reached = 0.0, 0.0, np.zeros(1)
+    peak, last = law.delta_peak[0], law.delta_max[0]
+    fixed = [0.0, peak, peak + law.softening.kink * (last - peak), law.delta_end[0]]
+    for target in np.asarray(path) * law.delta_end[0]:
+        corners = sorted(c for c in [*fixed, reached[0], law.plastic(reached)[0]] if (c - before) * (target - c) > 0)
+        for stop in [*(corners if target > before else corners[::-1]), target]:
+            at = before + (nodes + 1) / 2 * (stop - before)
+            force = [law.force(one(x), reached)[0] for x in at]
+            work += (stop - before) / 2 * float(weights @ force)
+            reached, before = law.reached(one(stop), reached), stop
+    balance = law.stored(one(before), reached) + law.dissipated(reached)
+    scale = law.k_n[0] * (np.abs(path).max() * law.delta_end[0]) ** 2 + law.f_max[0] * law.delta_max[0]
+    assert work == pytest.approx(
+        balance[0], abs=1e-12 * scale
+    )  # round-off of sums; 16 nodes take an exponential to 1e-13
+
+
+@given(st.sampled_from(SHAPES), st.floats(-1, 2), st.floats(0, 2))
+def test_linear_and_secant_are_the_plain_law(shape: Softening, opening: float, reached: float) -> None:
+    general, plain = CentralSoftening(one(K), one(F), one(D)), LAW
+    at, seen = one(opening * D), one(reached * D)
+    for name in ("force", "stored"):
+        assert getattr(general, name)(at, seen) == pytest.approx(getattr(plain, name)(at, seen), abs=1e-13 * F)
+    for name in ("envelope", "secant", "dissipated", "damage"):
+        scale = K if name == "secant" else F
+        assert getattr(general, name)(seen) == pytest.approx(getattr(plain, name)(seen), abs=1e-13 * scale)
+
+
+def test_part_and_scaled_law_keep_their_options() -> None:
+    law = CentralSoftening(np.array([K, 2 * K]), one(F), one(D), SHAPES[2], Unloading.ELASTIC)
+    assert law.of(np.array([1])).k_n == [2 * K]
+    assert law.of(np.array([1])).softening == SHAPES[2]
+    assert law.scaled(2.0).unloading is Unloading.ELASTIC
+    assert LAW.scaled(2.0).delta_max == [2 * D]
+    assert isinstance(LAW.of(np.array([0])), LinearSoftening)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +13,11 @@ from scipy.optimize import brentq
 
 from pipeline.core.errors import InputError
 from pipeline.materials.burgers import Burgers
-from pipeline.materials.cohesive import LinearSoftening
+from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
 from pipeline.materials.creeping_softening import BondState, CreepingSoftening
 from pipeline.materials.prony import PronySeries
 from pipeline.materials.relaxation import arms
+from pipeline.materials.softening import Softening, Unloading
 
 MASTIC = Burgers(d1=1e-10, d2=0.7e-10, eta1=1e12, tau2=10.0).relaxation()
 SHARE = 0.0444  # m; K^n = 4.4e8 N/m at E(0) = 10 GPa
@@ -167,3 +169,39 @@ def test_refusals():
         bonds(delta_max=-1.0)
     with pytest.raises(InputError, match="2 bonds for the arms of 1"):
         CreepingSoftening(arms(MASTIC, np.array([SHARE])), np.full(2, F), np.full(1, D))
+
+
+OPTIONS = [(s, u) for s in (Softening(), Softening("exponential"), Softening("bilinear-tail")) for u in Unloading]
+
+
+@pytest.mark.parametrize(("shape", "unloading"), OPTIONS)
+def test_without_time_it_is_the_law_without_creep(shape, unloading):
+    law = replace(bonds(), softening=shape, unloading=unloading)
+    plain, reached = CentralSoftening(law.k_n, law.f_max, law.delta_max, shape, unloading), np.zeros(1)
+    state, used = law.at_rest(), np.zeros(1)
+    for opening in np.array([[0.001, 0.3, 0.1, 0.7, -0.2, 0.6, 2.0, 5.0, 1.0, -0.1]]).T * D:
+        force = law.force(state, opening, 0.0)
+        assert force == pytest.approx(plain.force(opening, reached), abs=1e-11 * F)  # K(0) is a sum of arms
+        after = law.advance(state, opening, 0.0)
+        used = used + law.used(state, after, 0.0)
+        state, reached = after, plain.reached(opening, reached)
+        assert law.stored(state) == pytest.approx(plain.stored(opening, reached), abs=1e-11 * F * D)
+        assert used == pytest.approx(plain.dissipated(reached), abs=1e-10 * F * D)
+        expected = np.minimum(reached, plain.delta_end) * (reached > plain.delta_peak)
+        assert law.equivalent(state) == pytest.approx(expected, rel=1e-11)  # as above
+    assert law.broken(state).all()
+
+
+@pytest.mark.parametrize(("shape", "unloading"), OPTIONS)
+def test_work_is_stored_or_used_up_through_onset_and_failure(shape, unloading):
+    law = replace(bonds(), softening=shape, unloading=unloading)
+    onset, state, work, used = rate_onset(2e-7), bonds().at_rest(), 0.0, 0.0
+    path = np.concatenate([np.linspace(0, 30 * onset, 900), np.linspace(30 * onset, 5 * D, 300)])
+    for a, b in pairwise(path):
+        at, duration = np.array([b]), (b - a) / 2e-7
+        before = float(law.force(state, np.array([a]), 0.0)[0])
+        after = law.advance(state, at, duration)
+        work += 0.5 * (before + float(law.force(after, at, 0.0)[0])) * (b - a)
+        used += float(law.used(state, after, duration)[0])
+        state = after
+    assert float(law.stored(state)[0]) + used == pytest.approx(work, rel=1e-3)  # trapezoids of the work: second order

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 import pipeline
+from pipeline.core.clock import steady
 from pipeline.core.errors import InputError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Kinematics, Problem, Role
 from pipeline.core.specimen import SingleEdgeNotchedBeam
-from pipeline.materials.cohesive import LinearSoftening
+from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
+from pipeline.materials.softening import Shape, Softening, Unloading
 from pipeline.store.problem_key import problem_key
 
 ROOT = Path(pipeline.__file__).resolve().parents[1]
@@ -68,6 +70,14 @@ def changed(problem: Problem) -> dict[str, Problem]:
         "stations": replace(problem, stations=np.array([5e-5, 1e-4, 1.5e-4])),
         "accuracy": replace(problem, accuracy=0.02),
         "cmod_rate": replace(problem, cmod_rate=2e-5),
+        "clock": replace(problem, clock=steady(1e-5)),
+        "softening": problem.with_law(
+            CentralSoftening(law.k_n, law.f_max, law.delta_max, Softening(Shape.BILINEAR_TAIL))
+        ),
+        "tail": problem.with_law(
+            CentralSoftening(law.k_n, law.f_max, law.delta_max, Softening(Shape.BILINEAR_TAIL, 0.5))
+        ),
+        "unloading": problem.with_law(CentralSoftening(law.k_n, law.f_max, law.delta_max, unloading=Unloading.ELASTIC)),
     }
 
 
