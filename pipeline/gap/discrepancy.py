@@ -110,7 +110,7 @@ class Remnant:
         )
 
     def local(self) -> tuple[np.ndarray, np.ndarray]:
-        """Variance (s,), m², of the remainder that would leave as much beside the modes, and that which noise leaves."""
+        """Variance (s,), m², of a remainder that would leave as much beside the modes, and what of it noise leaves."""
         o = self.observation
         s, p = o.sight.cmod.size, len(o.sight.points)
         use = o.mask[: 2 * s * p : 2].reshape(s, p)

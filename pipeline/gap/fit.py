@@ -14,6 +14,7 @@ from pipeline.gap.metric import Metric
 STEP = 1e-3  # of the box, and of an amplitude's scale: central differences
 COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH standard deviations
 STARTS = 3  # nodes along each of two or more amplitudes, to start from
+CHORDS, SETTLED = 8, 1e-2  # steps of the parameters at a node, until χ² falls by less
 RULER = {2: 15, 3: 7}  # nodes along each principal axis of so many amplitudes; 5 of more
 
 
@@ -95,15 +96,11 @@ def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fi
     data : Data
     start : (q,) array; parameters to start from, the middle of the box where not given
     """
-    centre = data.box.mean(axis=1) if start is None else np.asarray(start, float)
-    k = len(candidate.bounds)
-    best = _climb(candidate, data, np.append(centre, np.zeros(k)))
-    for node in _coarse(candidate, COARSE if k == 1 else STARTS):
-        best = min(best, _climb(candidate, data, np.append(_profiled(best, data), node)), key=lambda f: f[1])
+    best = best_point(candidate, data, start)
     at, square, jacobian, residual = best
     nodes, log_area = _nodes(candidate, data, best)
-    profiles = [_profile(candidate, data, at, node) for node in nodes]
-    log_posterior = np.array([p[0] for p in profiles]) + candidate.log_prior(nodes) + log_area
+    profiles = np.array([_profile(candidate, data, best, node) for node in nodes])
+    log_posterior = profiles + candidate.log_prior(nodes) + log_area
     total = float(logsumexp(log_posterior))
     q = len(data.box)
     return Fitted(
@@ -123,6 +120,22 @@ def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fi
 Point = tuple[np.ndarray, float, np.ndarray, np.ndarray]  # parameters and amplitudes, χ², Jacobian, residual
 
 
+def best_point(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Point:
+    """Where a candidate fits best, from several starts; arguments as of `fit`."""
+    centre = data.box.mean(axis=1) if start is None else np.asarray(start, float)
+    k = len(candidate.bounds)
+    best = _climb(candidate, data, np.append(centre, np.zeros(k)))
+    for node in _coarse(candidate, STARTS + 2 if k == 1 else STARTS):
+        found = _climb(candidate, data, np.append(_profiled(best, data), node))
+        best = min(best, found, key=lambda point: _cost(candidate, data, point))
+    return best
+
+
+def _cost(candidate: Candidate, data: Data, point: Point) -> float:
+    """χ² less twice the logarithm of the prior: what is smallest at the best point."""
+    return point[1] - 2 * float(candidate.log_prior(point[0][len(data.box) :]))
+
+
 def _profiled(point: Point, data: Data) -> np.ndarray:
     return point[0][: len(data.box)]
 
@@ -134,8 +147,7 @@ def _coarse(candidate: Candidate, count: int) -> list[np.ndarray]:
 
 def jacobian(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray) -> np.ndarray:
     """White central differences of the prediction with respect to some of its arguments; (n, free)."""
-    q = len(data.box)
-    steps = STEP * np.concatenate([data.width, [min(m.scale, m.high) for m in candidate.components]])
+    q, steps = len(data.box), STEP * _scales(candidate, data)
     columns = []
     for i in free:
         low, high = at.copy(), at.copy()
@@ -145,19 +157,26 @@ def jacobian(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray)
     return data.metric.white(np.column_stack(columns)) if columns else np.zeros((data.target.size, 0))
 
 
-def _climb(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray | None = None, turns: int = 12) -> Point:
-    """Gauss–Newton with bounds and step halving over the free arguments; the prior draws amplitudes to none."""
+def _scales(candidate: Candidate, data: Data) -> np.ndarray:
+    """By how much each argument may plausibly vary; (q + k,)."""
+    return np.concatenate([data.width, [min(m.scale, m.high) for m in candidate.components]])
+
+
+def _climb(candidate: Candidate, data: Data, at: np.ndarray, turns: int = 12) -> Point:
+    """Gauss–Newton with bounds and step halving; the prior draws amplitudes to none."""
     q = len(data.box)
-    free = np.arange(at.size) if free is None else free
+    free = np.arange(at.size)
     bounds = np.vstack([data.box, candidate.bounds])
     pull = np.concatenate([np.zeros(q), [1 / m.scale for m in candidate.components]])
+    unit = _scales(candidate, data)[free]
     residual = data.residual(candidate, at)
     cost = residual @ residual + np.sum((pull * at) ** 2)
     slopes = jacobian(candidate, data, at, free)
     for _ in range(turns):
-        normal = slopes.T @ slopes + np.diag(pull[free] ** 2)
+        scaled = slopes * unit
+        normal = scaled.T @ scaled + np.diag((pull[free] * unit) ** 2)
         normal[np.diag_indices_from(normal)] += 1e-12 * np.trace(normal)
-        step = np.linalg.solve(normal, slopes.T @ residual - pull[free] ** 2 * at[free])
+        step = unit * np.linalg.solve(normal, scaled.T @ residual - unit * pull[free] ** 2 * at[free])
         for halving in range(6):
             moved = at.copy()
             moved[free] = np.clip(at[free] + step / 2**halving, *bounds[free].T)
@@ -169,17 +188,35 @@ def _climb(candidate: Candidate, data: Data, at: np.ndarray, free: np.ndarray | 
             break
         gained, at, residual, cost = cost - now, moved, left, now
         slopes = jacobian(candidate, data, at, free)
-        if gained < 1e-6 * max(1.0, 1e-3 * cost):
+        if gained < 1e-4:
             break
     return at, float(residual @ residual), slopes, residual
 
 
-def _profile(candidate: Candidate, data: Data, near: np.ndarray, node: np.ndarray) -> tuple[float, np.ndarray]:
-    """log ∫ likelihood over the parameters by Laplace, the amplitudes held at a node; and the best parameters."""
+def _profile(candidate: Candidate, data: Data, best: Point, node: np.ndarray) -> float:
+    """log ∫ likelihood over the parameters by Laplace, the amplitudes held at a node.
+
+    The parameters follow by chords, with the derivatives of the best point, in which they are nearly linear.
+    """
+    at, _, slopes, _ = best
     q = len(data.box)
-    at, square, slopes, _ = _climb(candidate, data, np.append(near[:q], node), np.arange(q), turns=6)
-    _, determinant = np.linalg.slogdet(slopes.T @ slopes)
-    return -0.5 * square + 0.5 * q * np.log(2 * np.pi) - 0.5 * determinant, at[:q]
+    free, bound = slopes[:, :q], slopes[:, q:]
+    solve = np.linalg.pinv(free * data.width, rcond=1e-9) * data.width[:, None]
+    here = np.append(at[:q] - solve @ (bound @ (node - at[q:])), node)
+    here[:q] = np.clip(here[:q], *data.box.T)
+    residual = data.residual(candidate, here)
+    for _ in range(CHORDS):
+        moved = here.copy()
+        moved[:q] = np.clip(here[:q] + solve @ residual, *data.box.T)
+        left = data.residual(candidate, moved)
+        gained = residual @ residual - left @ left
+        if gained <= 0:
+            break
+        here, residual = moved, left
+        if gained < SETTLED:
+            break
+    _, determinant = np.linalg.slogdet(free.T @ free)
+    return float(-0.5 * residual @ residual + 0.5 * q * np.log(2 * np.pi) - 0.5 * determinant)
 
 
 def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -188,8 +225,10 @@ def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, n
     q, k = len(data.box), len(candidate.bounds)
     if k == 0:
         return np.zeros((1, 0)), np.zeros(1)
-    prior = np.concatenate([np.zeros(q), [1 / m.scale**2 for m in candidate.components]])
-    covariance = np.linalg.inv(slopes.T @ slopes + np.diag(prior + 1e-300))[q:, q:]
+    unit = _scales(candidate, data)
+    prior = np.concatenate([np.zeros(q), [1 / m.scale**2 for m in candidate.components]]) * unit**2
+    scaled = slopes * unit
+    covariance = (np.linalg.inv(scaled.T @ scaled + np.diag(prior)) * np.outer(unit, unit))[q:, q:]
     if k == 1:
         low, high = candidate.bounds[0]
         fine = at[q] + REACH * np.sqrt(covariance[0, 0]) * np.linspace(-1, 1, FINE)

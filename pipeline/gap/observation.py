@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ class Sight:
     centre : (2,) array, m; of the camera's view
     corner : float, m; distance of the corners of the view from its centre
     pull : (2,) array; unit vector along which a yielding fixture lets the specimen go
+    contacts : (c, 2) array, m; of machine and specimen, for naming regions
     """
 
     cmod: np.ndarray
@@ -39,6 +40,7 @@ class Sight:
     centre: np.ndarray
     corner: float
     pull: np.ndarray
+    contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         if self.time.shape != self.cmod.shape or self.side.shape != self.points.shape[:1]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline
 
 from pipeline.core.errors import InputError
 from pipeline.gap.observation import Reading
@@ -29,22 +30,54 @@ class Abscissae:
             if values.size < 2 or not (np.diff(values, prepend=0.0) > 0).all():
                 raise InputError(f"CMOD values of the {name} must be positive, increasing and at least two: {values}")
 
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        """Every frame's part in the cubic spline through all of them and rest."""
+        knots = np.append(0.0, self.field)
+        return CubicSpline(knots, np.eye(knots.size)[:, 1:])
+
+    def frames_to(self, at: np.ndarray) -> np.ndarray:
+        """Weights (s, k) of the frames in a field at CMOD values (s,), m.
+
+        A cubic spline through frames and rest; beyond the last frame its last slope is continued: a gauge that reads
+        too little looks a little farther than it says.
+        """
+        last = self.field[-1]
+        beyond = np.maximum(at - last, 0.0)
+        return self._spline(np.clip(at, 0.0, last)) + beyond[:, None] * self._spline(last, 1)
+
+    def loads_to(self, load: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Loads (s,) at CMOD values (s,), m, along straight lines; beyond the last the last stretch is continued."""
+        knots, values = np.append(0.0, self.load), np.append(0.0, load)
+        slope = (values[-1] - values[-2]) / (knots[-1] - knots[-2])
+        return np.interp(at, knots, values) + np.maximum(at - knots[-1], 0.0) * slope
+
+    def known_at(self, known: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Whether fields (s, p) at CMOD values (s,) rest on frames that are there, from whether those are (k, p)."""
+        upper = np.minimum(np.searchsorted(self.field, at * (1 - 1e-9)), self.field.size - 1)
+        return np.logical_and.accumulate(known, axis=0)[upper]
+
+    def reached(self, known: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """The same for loads: (s,) from (l,)."""
+        upper = np.minimum(np.searchsorted(self.load, at * (1 - 1e-9)), self.load.size - 1)
+        return np.logical_and.accumulate(known)[upper]
+
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """One simulation at the abscissae, or several along leading axes.
+    """One simulation at the abscissae.
 
     Parameters
     ----------
-    field : (..., k, p, 2) array, m; NaN where a point could not be observed
-    load : (..., l) array, N; NaN where the CMOD was not reached
+    field : (k, p, 2) array, m; NaN where a point could not be observed
+    load : (l,) array, N; NaN where the CMOD was not reached
     """
 
     field: np.ndarray
     load: np.ndarray
 
     def flat(self) -> np.ndarray:
-        """All numbers of one simulation, field first; (2kp + l,)."""
+        """All numbers, field first; (2kp + l,)."""
         return np.concatenate([self.field.ravel(), self.load])
 
 
@@ -54,38 +87,20 @@ def split(flat: np.ndarray, abscissae: Abscissae, points: int) -> Response:
     return Response(flat[:cut].reshape(abscissae.field.size, points, 2), flat[cut:])
 
 
+def continued(values: np.ndarray) -> np.ndarray:
+    """Values (k, ...) whose missing last entries repeat the last step, so that a spline stays smooth up to them."""
+    found = np.array(values, float)
+    for k in range(1, len(found)):
+        step = found[k - 1] - found[k - 2] if k > 1 else np.zeros_like(found[0])
+        found[k] = np.where(np.isfinite(found[k]), found[k], found[k - 1] + step)
+    return np.nan_to_num(found)
+
+
 def read(response: Response, abscissae: Abscissae, field_at: np.ndarray, load_at: np.ndarray) -> Reading:
-    """Field (s, p, 2) and load (s,) of a simulation at true CMOD values (s,), m.
-
-    Fields are interpolated by monotone cubics (Fritsch and Carlson 1980), which follow the bend before the peak
-    without swinging; loads, kept far denser, along straight lines. Beyond the last frame the last stretch is
-    continued: a gauge that reads too much looks a little farther than it says.
-    """
-    knots = np.append(0.0, abscissae.field)
-    values = np.concatenate([np.zeros((1, *response.field.shape[1:])), response.field])
-    known = np.isfinite(values).all(axis=2)
-    field = np.full((field_at.size, *response.field.shape[1:]), np.nan)
-    for pattern in np.unique(known, axis=1).T:  # points with the same frames go together
-        points = np.flatnonzero((known == pattern[:, None]).all(axis=0))
-        if pattern.sum() >= 3:
-            field[:, points] = _along(knots[pattern], values[np.ix_(pattern, points)], field_at, bool(pattern[-1]))
-    return Reading(field, _straight(abscissae.load, response.load, load_at))
-
-
-def _along(knots: np.ndarray, values: np.ndarray, at: np.ndarray, whole: bool) -> np.ndarray:
-    """Values at `at`, NaN beyond the last knot where the last frames are missing."""
-    curve = PchipInterpolator(knots, values, axis=0)
-    beyond = np.maximum(at - knots[-1], 0.0)
-    slope = (values[-1] - values[-2]) / (knots[-1] - knots[-2])
-    found = curve(np.clip(at, 0.0, knots[-1])) + beyond[:, None, None] * slope
-    if not whole:
-        found[beyond > 1e-9 * knots[-1]] = np.nan
-    return found
-
-
-def _straight(known: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Loads at `at`; beyond the last known one the last stretch is continued."""
-    there = np.isfinite(load)
-    knots, values = np.append(0.0, known[there]), np.append(0.0, load[there])
-    slope = (values[-1] - values[-2]) / (knots[-1] - knots[-2])
-    return np.interp(at, knots, values) + np.maximum(at - knots[-1], 0.0) * slope
+    """Field (s, p, 2) and load (s,) of a simulation at true CMOD values (s,), m; NaN where it does not reach."""
+    known = np.isfinite(response.field.sum(axis=2))
+    field = np.tensordot(abscissae.frames_to(field_at), continued(response.field), 1)
+    field[~abscissae.known_at(known, field_at)] = np.nan
+    load = abscissae.loads_to(continued(response.load), load_at)
+    load[~abscissae.reached(np.isfinite(response.load), load_at)] = np.nan
+    return Reading(field, load)

@@ -1,0 +1,295 @@
+"""One diagnosis, from the baseline to the verdict; simulations come from a function that is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.core.errors import ConvergenceError
+from pipeline.gap.candidate import Candidate
+from pipeline.gap.closure import Closure, closure, folds, held_out
+from pipeline.gap.effect import MeasurementEffect
+from pipeline.gap.effects import effect, library
+from pipeline.gap.emulator import Emulator, Signature
+from pipeline.gap.fit import Data, Fitted, fit
+from pipeline.gap.gate import Gate, gate
+from pipeline.gap.identifiability import Card, card
+from pipeline.gap.library import Entry
+from pipeline.gap.metric import Metric
+from pipeline.gap.observation import Observation
+from pipeline.gap.response import Abscissae, Response
+from pipeline.gap.score import NONE, Scored, pairs, score
+from pipeline.gap.verdict import Verdict, verdict
+from pipeline.gap.where import Cell, where
+from pipeline.inverse.design import Design
+from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance
+
+FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, for effects pull parameters away
+MOVES = 2  # how often the grid follows the fit of the model as it is, which an effect may pull far away
+LIKELY = 0.05  # probability from which a physics effect is simulated again at its best point
+CONFIRMED = 3  # at most so many
+CLOSED = 3  # best explanations whose closure is looked at
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation that is asked for: parameters (N, m) and physics effects by name."""
+
+    f_max: float
+    delta_max: float
+    effects: tuple[tuple[str, float], ...] = ()
+
+
+Outcome = Response | str
+"""A simulation, or why there is none."""
+
+Simulate = Callable[[Sequence[Run]], list[Outcome]]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything that was found.
+
+    Parameters
+    ----------
+    observation : Observation, of the data that all simulations have
+    emulator : Emulator
+    data : Data
+    fits : label → Fitted; "none" among them
+    scored : Scored
+    card : Card
+    gate : Gate
+    cells : list of Cell; the table of where, for the model as it is
+    closures : label → Closure, of the best explanations
+    verdict : Verdict
+    untested : effect → why it could not be judged
+    runs : int; simulations asked for
+    """
+
+    observation: Observation
+    emulator: Emulator
+    data: Data
+    fits: Mapping[str, Fitted]
+    scored: Scored
+    card: Card
+    gate: Gate
+    cells: list[Cell]
+    closures: Mapping[str, Closure]
+    verdict: Verdict
+    untested: Mapping[str, str]
+    runs: int
+
+    @property
+    def best(self) -> Fitted:
+        """The most probable explanation."""
+        return self.fits[self.scored.ranked()[0]]
+
+
+class _Counted:
+    """Simulations, counted."""
+
+    def __init__(self, simulate: Simulate) -> None:
+        self.simulate, self.count = simulate, 0
+
+    def __call__(self, runs: Sequence[Run]) -> list[Outcome]:
+        self.count += len(runs)
+        return self.simulate(runs)
+
+
+def diagnose(
+    observation: Observation,
+    abscissae: Abscissae,
+    simulate: Simulate,
+    start: tuple[float, float],
+    entry: Entry,
+    rng: np.random.Generator,
+    names: Sequence[str] | None = None,
+    factors: tuple[float, ...] = FACTORS,
+) -> Diagnosis:
+    """Diagnose one test.
+
+    Parameters
+    ----------
+    observation : Observation
+    abscissae : Abscissae at which `simulate` answers
+    simulate : Simulate
+    start : (f_max, δ_max), N and m; centre of the first grid
+    entry : Entry of the library of discrepancies
+    rng : numpy Generator; of bootstrap and floor
+    names : effects to be tested, all where not given
+    factors : of the grid
+
+    Raises
+    ------
+    ConvergenceError
+        where the baseline cannot be simulated, or the best explanation lies on the edge of the grid
+    """
+    counted = _Counted(simulate)
+    emulator = baseline(observation, abscissae, counted, Design(start, factors, factors), entry)
+    none = fit(*_none(observation, emulator, entry))
+    emulator, untested = with_signatures(emulator, counted, none.parameters, names)
+    known = [n for n in sorted(names or library()) if n not in untested]
+    observation, data = weighed(observation, emulator, entry)
+    look = _Look(observation, data, known, entry.temperature, none.parameters)
+    fits, scored = look.judge(emulator)
+    emulator = confirmed(emulator, counted, fits, scored)
+    observation, data = weighed(observation, emulator, entry)
+    look = replace(look, observation=observation, data=data)
+    fits, scored = look.judge(emulator)
+    singles = {n: emulator.candidate([n], observation.mask) for n in known}
+    table = card(singles, data, fits[NONE].parameters, entry.temperature)
+    best = fits[scored.ranked()[0]]
+    if best.at_edge:
+        raise ConvergenceError(
+            f"the best explanation, {best.candidate.label}, lies on the edge of the grid at f_max = "
+            f"{best.parameters[0]:.4g} N, delta_max = {best.parameters[1]:.4g} m: check units, or move [start] there"
+        )
+    left = data.target - best.candidate.predict(best.parameters, best.amplitudes)
+    judged = gate(observation, left, data.metric.covariance, entry.discrepancy.samples)
+    none = fits[NONE]
+    residual = data.target - none.candidate.predict(none.parameters, none.amplitudes)
+    return Diagnosis(
+        observation=observation,
+        emulator=emulator,
+        data=data,
+        fits=fits,
+        scored=scored,
+        card=table,
+        gate=judged,
+        cells=where(observation, residual, data.metric.covariance),
+        closures=closures(observation, data, fits, scored, rng),
+        verdict=verdict(scored, table, judged),
+        untested=untested,
+        runs=counted.count,
+    )
+
+
+def baseline(
+    observation: Observation, abscissae: Abscissae, simulate: Simulate, design: Design, entry: Entry
+) -> Emulator:
+    """Simulate the grid; move it while the fit of the model as it is lies outside its inner cells."""
+    for _ in range(MOVES + 1):
+        outcomes = simulate([Run(f, d) for f, d in design.nodes()])
+        missing = [o for o in outcomes if isinstance(o, str)]
+        if missing:
+            raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {missing[0]}")
+        values = np.reshape([o.flat() for o in outcomes if not isinstance(o, str)], (*design.shape, -1))
+        emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values)
+        found = fit(*_none(observation, emulator, entry)).parameters
+        steps = [int(x > high) - int(x < low) for x, (low, high) in zip(found, emulator.inner, strict=True)]
+        moved = design.moved(*steps)
+        if moved == design:
+            break
+        design = moved
+    return emulator
+
+
+def _none(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Candidate, Data]:
+    part, data = weighed(observation, emulator, entry)
+    return emulator.candidate([], part.mask), data
+
+
+def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Observation, Data]:
+    """The data that all simulations have, with Σ = noise + discrepancy + scatter of the simulations themselves."""
+    part = observation.only(observation.mask & emulator.available())
+    mask = part.mask
+    covariance = np.diag(part.noise) + entry.discrepancy.covariance(part.sight, part.load_scale)
+    covariance = covariance[np.ix_(mask, mask)] + scatter(emulator, mask)
+    return part, Data(part.reading.flat()[mask], Metric(covariance), emulator.box)
+
+
+def scatter(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
+    """Covariance (n, n) of what changes from simulation to simulation without order (crack paths that jump)."""
+    nodes = [np.array([f, d]) for f in emulator.f_max for d in emulator.delta_max]
+    seen = np.reshape(
+        [emulator.reading(node).flat()[mask] for node in nodes],
+        (emulator.f_max.size, emulator.delta_max.size, -1),
+    )
+    return node_covariance(LagrangeSurrogate(emulator.f_max, emulator.delta_max, seen))[0]
+
+
+def with_signatures(
+    emulator: Emulator, simulate: Simulate, parameters: np.ndarray, names: Sequence[str] | None
+) -> tuple[Emulator, dict[str, str]]:
+    """Simulate every physics effect at two values; those that cannot be simulated are returned with the reason."""
+    wanted = [n for n in sorted(names or library()) if not isinstance(effect(n), MeasurementEffect)]
+    at = (float(parameters[0]), float(parameters[1]))
+    runs = [Run(*at)] + [Run(*at, ((n, v),)) for n in wanted for v in effect(n).magnitude.trials]
+    reference, *others = simulate(runs)
+    if isinstance(reference, str):
+        raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {reference}")
+    signatures, untested = {}, {}
+    for i, name in enumerate(wanted):
+        both = others[2 * i : 2 * i + 2]
+        reasons = [o for o in both if isinstance(o, str)]
+        if reasons:
+            untested[name] = reasons[0]
+            continue
+        changes = np.array([o.flat() - reference.flat() for o in both if not isinstance(o, str)])
+        signatures[name] = Signature(np.array(effect(name).magnitude.trials), changes)
+    placed = replace(emulator, signatures=signatures)
+    return placed.confirmed(parameters, reference.flat()), untested
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What stays the same while the emulator becomes better."""
+
+    observation: Observation
+    data: Data
+    names: list[str]
+    temperature: float
+    parameters: np.ndarray
+
+    def judge(self, emulator: Emulator) -> tuple[dict[str, Fitted], Scored]:
+        """Fit none, every effect and the pairs of the best; score them."""
+        fits = {NONE: self._fit(emulator, ())}
+        for name in self.names:
+            fits[name] = self._fit(emulator, (name,))
+        for pair in pairs(self._score(fits)):
+            found = self._fit(emulator, pair)
+            fits[found.candidate.label] = found
+        return fits, self._score(fits)
+
+    def _fit(self, emulator: Emulator, names: tuple[str, ...]) -> Fitted:
+        return fit(emulator.candidate(names, self.observation.mask), self.data, self.parameters)
+
+    def _score(self, fits: Mapping[str, Fitted]) -> Scored:
+        evidence = {label: f.log_evidence for label, f in fits.items()}
+        members = {label: len(f.candidate.names) for label, f in fits.items()}
+        return score(evidence, members, len(self.names), self.temperature)
+
+
+def confirmed(emulator: Emulator, simulate: Simulate, fits: Mapping[str, Fitted], scored: Scored) -> Emulator:
+    """Simulate the likely physics effects at their best points, and let the emulator meet them there."""
+    likely = [
+        fits[label]
+        for label in scored.ranked()
+        if scored.probability[label] >= LIKELY and label in emulator.signatures and fits[label].amplitudes[0] != 0
+    ][:CONFIRMED]
+    runs = [_run_of(f) for f in likely]
+    for found, outcome in zip(likely, simulate(runs) if runs else [], strict=True):
+        if not isinstance(outcome, str):
+            name, value = found.candidate.names[0], float(found.amplitudes[0])
+            emulator = emulator.with_confirmed(name, value, found.parameters, outcome.flat())
+    return emulator
+
+
+def _run_of(found: Fitted) -> Run:
+    f_max, delta_max = (float(x) for x in found.parameters)
+    return Run(f_max, delta_max, ((found.candidate.names[0], float(found.amplitudes[0])),))
+
+
+def closures(
+    observation: Observation, data: Data, fits: Mapping[str, Fitted], scored: Scored, rng: np.random.Generator
+) -> dict[str, Closure]:
+    """Closure of the best explanations, the runner-up's beside the first's."""
+    within, across = folds(observation)
+    none = held_out(fits[NONE].candidate, data, within + across, fits[NONE].parameters)
+    found = {}
+    for label in [label for label in scored.ranked() if label != NONE][:CLOSED]:
+        other = held_out(fits[label].candidate, data, within + across, fits[label].parameters)
+        found[label] = closure(observation, data, none, other, rng.spawn(1)[0])
+    return found

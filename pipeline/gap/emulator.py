@@ -1,0 +1,188 @@
+"""Simulations turned into a function: any parameters, any amplitudes of effects, at no cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.gap.candidate import Candidate
+from pipeline.gap.effect import MeasurementEffect
+from pipeline.gap.effects import effect
+from pipeline.gap.observation import Reading, Sight
+from pipeline.gap.response import Abscissae, Response, continued, split
+from pipeline.inverse.surrogate import LagrangeSurrogate
+
+MARGIN = 0.1  # of the grid's width, by which parameters may leave it
+SHIFTS = (0.85, 1.0, 1.15)  # of the stations: data that a shift along the CMOD would lose are left out for all alike
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """What a physics effect changes: a parabola through none and two simulated values.
+
+    Parameters
+    ----------
+    values : (2,) array; at which it was simulated
+    changes : (2, n) array; of `Response.flat`, against the simulation without it at the same parameters
+    """
+
+    values: np.ndarray
+    changes: np.ndarray
+
+    def at(self, value: float) -> np.ndarray:
+        """Change (n,) by another value (Lagrange's polynomial with the third node at none)."""
+        one, two = self.values
+        weight = np.array([value * (value - two) / (one * (one - two)), value * (value - one) / (two * (two - one))])
+        return weight @ self.changes
+
+    def corrected(self, value: float, error: np.ndarray) -> Signature:
+        """With a change that grows in proportion to the value and is `error` (n,) at this one."""
+        return replace(self, changes=self.changes + np.outer(self.values / value, error))
+
+
+@dataclass(frozen=True, eq=False)
+class Emulator:
+    """Data of a test as a function of (f_max, δ_max) and of effects.
+
+    Parameters
+    ----------
+    sight : Sight
+    abscissae : Abscissae
+    f_max, delta_max : (n_f,), (n_d,) arrays, N and m; the grid
+    values : (n_f, n_d, n) array of `Response.flat`
+    signatures : effect → Signature, physics effects only
+    offset : (n,) array; added to everything, so that a confirmed point is met exactly
+    """
+
+    sight: Sight
+    abscissae: Abscissae
+    f_max: np.ndarray
+    delta_max: np.ndarray
+    values: np.ndarray
+    signatures: Mapping[str, Signature] = field(default_factory=dict)
+    offset: np.ndarray | float = 0.0
+
+    @cached_property
+    def _known(self) -> np.ndarray:
+        """Numbers that every simulation has; (n,) bool."""
+        known = np.isfinite(self.values).all(axis=(0, 1))
+        for signature in self.signatures.values():
+            known &= np.isfinite(signature.changes).all(axis=0)
+        return known & np.isfinite(self.offset)
+
+    @cached_property
+    def _surrogate(self) -> LagrangeSurrogate:
+        return LagrangeSurrogate(self.f_max, self.delta_max, self._continued(self.values))
+
+    @cached_property
+    def _smooth(self) -> tuple[Mapping[str, Signature], np.ndarray]:
+        """Signatures and offset without gaps."""
+        whole = {n: replace(s, changes=self._continued(s.changes)) for n, s in self.signatures.items()}
+        return whole, self._continued(np.broadcast_to(self.offset, self.values.shape[-1:]))
+
+    def _continued(self, flat: np.ndarray) -> np.ndarray:
+        """Numbers (..., n) whose gaps are bridged; they are never compared, see `available`."""
+        rows = np.reshape(flat, (-1, flat.shape[-1]))
+        points = len(self.sight.points)
+        parts = [split(row, self.abscissae, points) for row in rows]
+        return np.reshape([Response(continued(p.field), continued(p.load)).flat() for p in parts], flat.shape)
+
+    @cached_property
+    def _usual(self) -> np.ndarray:
+        return self.abscissae.frames_to(self.sight.cmod)
+
+    @property
+    def box(self) -> np.ndarray:
+        """Bounds of the parameters; (2, 2)."""
+        lines = (self.f_max, self.delta_max)
+        return np.array([(x[0] - MARGIN * np.ptp(x), x[-1] + MARGIN * np.ptp(x)) for x in lines])
+
+    @property
+    def inner(self) -> np.ndarray:
+        """Bounds inside the outermost cells of the grid; (2, 2)."""
+        return np.array([(x[1], x[-2]) for x in (self.f_max, self.delta_max)])
+
+    def response(self, parameters: np.ndarray, physics: Mapping[str, float]) -> Response:
+        """What a simulation would say."""
+        signatures, offset = self._smooth
+        flat = self._surrogate.value(parameters) + offset
+        for name, value in physics.items():
+            flat += signatures[name].at(value)
+        return split(flat, self.abscissae, len(self.sight.points))
+
+    def reading(
+        self, parameters: np.ndarray, names: Sequence[str] = (), amplitudes: np.ndarray | None = None
+    ) -> Reading:
+        """What camera and load cell would say, effects acting in the order of their names.
+
+        Parameters
+        ----------
+        parameters : (2,) array, N and m
+        names : effects
+        amplitudes : (k,) array; of the effects in the order given, one a direction
+        """
+        measuring, physics = self._sorted(names, np.zeros(0) if amplitudes is None else amplitudes)
+        field_at = load_at = self.sight.cmod
+        for one, value in measuring:
+            field_at, load_at = one.field_at(value, self.sight, field_at), one.load_at(value, self.sight, load_at)
+        simulated, same = self.response(parameters, physics), field_at is self.sight.cmod
+        weights = self._usual if same else self.abscissae.frames_to(field_at)
+        field = (weights @ simulated.field.reshape(len(simulated.field), -1)).reshape(-1, *simulated.field.shape[1:])
+        found = Reading(field, self.abscissae.loads_to(simulated.load, load_at))
+        for one, value in measuring:
+            found = one.distort(value, self.sight, found)
+        return found
+
+    def _sorted(
+        self, names: Sequence[str], amplitudes: np.ndarray
+    ) -> tuple[list[tuple[MeasurementEffect, np.ndarray]], dict[str, float]]:
+        at, measuring, physics = 0, {}, {}
+        for name in names:
+            one = effect(name)
+            part = amplitudes[at : at + one.magnitude.directions]
+            at += one.magnitude.directions
+            if isinstance(one, MeasurementEffect):
+                measuring[name] = (one, part)
+            else:
+                physics[name] = float(part[0])
+        return [measuring[name] for name in sorted(measuring)], physics
+
+    def available(self) -> np.ndarray:
+        """Which numbers of `Reading.flat` every candidate can predict; (2sp + s,) bool."""
+        known = split(self._known, self.abscissae, len(self.sight.points))
+        frames, cmod, look = known.field.sum(axis=2) == 2, self.sight.cmod, self.abscissae
+        field = np.all([look.known_at(frames, s * cmod) for s in SHIFTS], axis=0)
+        load = np.all([look.reached(known.load, s * cmod) for s in SHIFTS], axis=0)
+        return np.concatenate([np.repeat(field.ravel(), 2), load])
+
+    def candidate(self, names: Sequence[str], mask: np.ndarray) -> Candidate:
+        """The explanation by some effects; none without names.
+
+        Parameters
+        ----------
+        names : effects; physics effects among them need a signature
+        mask : (2sp + s,) bool; the data
+        """
+        lacking = [n for n in names if not isinstance(effect(n), MeasurementEffect) and n not in self.signatures]
+        if lacking:
+            raise InputError(f"{', '.join(lacking)} was not simulated: there is no signature to judge it by")
+        chosen = tuple(names)
+        return Candidate(
+            chosen,
+            tuple(effect(n).magnitude for n in chosen),
+            lambda parameters, amplitudes: self.reading(parameters, chosen, amplitudes).flat()[mask],
+        )
+
+    def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
+        """Moved by what a simulation without effects at these parameters, `Response.flat` (n,), says otherwise."""
+        return replace(self, offset=self.offset + simulated - self.response(parameters, {}).flat())
+
+    def with_confirmed(self, name: str, value: float, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
+        """The same for an effect: its signature then meets the simulation of this value at these parameters."""
+        error = simulated - self.response(parameters, {name: value}).flat()
+        changed = dict(self.signatures) | {name: self.signatures[name].corrected(value, error)}
+        return replace(self, signatures=changed)

@@ -1,0 +1,162 @@
+"""What is known of honest engines' differences, and how far probabilities may be trusted; learnt offline, shipped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.core.units import MM, UM
+from pipeline.gap.discrepancy import ALL, Discrepancy
+from pipeline.gap.observation import Observation
+
+FILE, FORMAT = "library.json", 1
+
+
+@dataclass(frozen=True)
+class Domain:
+    """For what a discrepancy was learnt.
+
+    Parameters
+    ----------
+    geometry : str
+    radius : (low, high), m; of the diagnosing particles
+    cmod : float, m; last station
+    noise : (low, high), m; of one displacement component
+    """
+
+    geometry: str
+    radius: tuple[float, float]
+    cmod: float
+    noise: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A discrepancy with its domain, its check and the temper of the probabilities.
+
+    Parameters
+    ----------
+    domain : Domain
+    discrepancy : Discrepancy
+    temperature : float, at least 1
+    tests : int; blind tests behind the temperature, 0: not calibrated
+    check : mode → χ² over degrees of freedom of left-out specimens
+    """
+
+    domain: Domain
+    discrepancy: Discrepancy
+    temperature: float
+    tests: int
+    check: Mapping[str, float]
+
+    def warnings(self, geometry: str, radius: float, observation: Observation) -> list[str]:
+        """What of a test lies outside the domain; one sentence each."""
+        d, found = self.domain, []
+        if geometry != d.geometry:
+            found.append(f"the library of discrepancies was learnt on {d.geometry}, not on {geometry}")
+        if not d.radius[0] * 0.999 <= radius <= d.radius[1] * 1.001:
+            found.append(
+                f"particles of {radius / MM:.3g} mm: the library holds for {d.radius[0] / MM:.3g} to "
+                f"{d.radius[1] / MM:.3g} mm"
+            )
+        last = observation.sight.cmod.max()
+        if last > 1.05 * d.cmod:
+            found.append(f"stations up to {last / MM:.3g} mm: the library holds up to {d.cmod / MM:.3g} mm")
+        if observation.has_field:
+            typical = float(np.nanmedian(observation.field_std))
+            if not d.noise[0] <= typical <= d.noise[1]:
+                found.append(
+                    f"noise of {typical / UM:.3g} µm: the library holds for {d.noise[0] / UM:.3g} to "
+                    f"{d.noise[1] / UM:.3g} µm"
+                )
+        if self.tests == 0:
+            found.append("probabilities are not calibrated on blind tests: take them as too sure")
+        return found
+
+
+def shipped() -> list[Entry]:
+    """The entries of the library that comes with the package."""
+    text = resources.files("pipeline.gap").joinpath(FILE).read_text("utf-8")
+    return parse(json.loads(text))
+
+
+def nearest(entries: list[Entry], geometry: str, radius: float) -> Entry:
+    """The entry to judge a test by: of its geometry where there is one, of the radius nearest in proportion.
+
+    Raises
+    ------
+    InputError
+        where the library is empty
+    """
+    if not entries:
+        raise InputError("the library of discrepancies is empty: make it with scripts/gap_library")
+    own = [e for e in entries if e.domain.geometry == geometry] or entries
+    return min(own, key=lambda e: abs(np.log(radius / np.sqrt(e.domain.radius[0] * e.domain.radius[1]))))
+
+
+def parse(raw: Mapping[str, Any]) -> list[Entry]:
+    """Entries from what the file holds.
+
+    Raises
+    ------
+    InputError
+        for another format, or other modes
+    """
+    if raw.get("format") != FORMAT or raw.get("modes") != list(ALL):
+        raise InputError(f"{FILE} is not of format {FORMAT} with the modes {', '.join(ALL)}: make it anew")
+    return [_entry(e) for e in raw["entries"]]
+
+
+def _entry(raw: Mapping[str, Any]) -> Entry:
+    d = raw["domain"]
+    domain = Domain(
+        d["geometry"],
+        (d["radius_mm"][0] * MM, d["radius_mm"][1] * MM),
+        d["cmod_mm"] * MM,
+        (d["noise_um"][0] * UM, d["noise_um"][1] * UM),
+    )
+    amplitude = np.array(raw["amplitude_um"]) * UM
+    amplitude = np.vstack([amplitude, raw["amplitude_load"]])
+    discrepancy = Discrepancy(
+        amplitude,
+        np.array(raw["correlation"]),
+        np.array(raw["remainder_um"]) * UM,
+        raw["length_mm"] * MM,
+        raw["spread_mm"] * MM,
+        raw["samples"],
+    )
+    return Entry(domain, discrepancy, raw["temperature"], raw["tests"], raw["check"])
+
+
+def written(entries: list[Entry], told: Mapping[str, Any]) -> str:
+    """The text of the file; `told` says how it was made."""
+    raw = {"format": FORMAT, "modes": list(ALL), "made": dict(told), "entries": [_raw(e) for e in entries]}
+    return json.dumps(raw, indent=1) + "\n"
+
+
+def _raw(entry: Entry) -> dict[str, Any]:
+    d, x = entry.domain, entry.discrepancy
+    return {
+        "domain": {
+            "geometry": d.geometry,
+            "radius_mm": [r / MM for r in d.radius],
+            "cmod_mm": d.cmod / MM,
+            "noise_um": [s / UM for s in d.noise],
+        },
+        "amplitude_um": np.round(x.amplitude[:-1] / UM, 4).tolist(),
+        "amplitude_load": np.round(x.amplitude[-1], 6).tolist(),
+        "correlation": np.round(x.correlation, 4).tolist(),
+        "remainder_um": np.round(x.remainder / UM, 4).tolist(),
+        "length_mm": round(x.length / MM, 4),
+        "spread_mm": x.spread / MM,
+        "samples": x.samples,
+        "temperature": round(entry.temperature, 4),
+        "tests": entry.tests,
+        "check": {mode: round(value, 3) for mode, value in entry.check.items()},
+    }

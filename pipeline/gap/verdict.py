@@ -1,0 +1,57 @@
+"""The verdict, from probabilities, classes and the gate; nothing here knows an effect by its name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.gap.gate import Gate
+from pipeline.gap.identifiability import Card
+from pipeline.gap.score import NONE, Scored
+
+SURE = 0.8  # probability from which a cause or a class is named
+HALF = 0.5  # probability of none from which no cause is looked for
+
+NONE_NEEDED, CAUSE, CLASS, ONE_OF, OUTSIDE = "none needed", "cause", "class", "one of", "outside the library"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is said.
+
+    Parameters
+    ----------
+    kind : one of the five
+    named : tuple of effects
+    reason : one sentence
+    """
+
+    kind: str
+    named: tuple[str, ...]
+    reason: str
+
+
+def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
+    """Say what the data allow to be said."""
+    if not gate.passed:
+        worst = gate.failed[0]
+        excess = gate.ratio[worst] / gate.limit[worst]
+        return Verdict(
+            OUTSIDE,
+            (),
+            f"no effect of the library explains these data: {worst} stays {excess:.2g} times above what complete "
+            "models leave; or the simulation itself fails",
+        )
+    if scored.probability[NONE] >= HALF:
+        return Verdict(NONE_NEEDED, (), f"the model as it is has probability {scored.probability[NONE]:.2f}")
+    top = next(label for label in scored.ranked() if label != NONE)
+    names = tuple(top.split(" + "))
+    mates = tuple(dict.fromkeys(m for n in names for m in card.class_of(n)))
+    alone = len(mates) == len(names)
+    if scored.probability[top] >= SURE and alone:
+        return Verdict(CAUSE, names, f"{top} has probability {scored.probability[top]:.2f}")
+    together = sum(p for label, p in scored.probability.items() if label in mates)
+    if len(names) == 1 and not alone and together >= SURE:
+        return Verdict(CLASS, mates, f"one of these has probability {together:.2f}; these data do not tell them apart")
+    credible = [label for label in scored.credible() if label != NONE]
+    named = tuple(dict.fromkeys(n for label in credible for n in label.split(" + ")))
+    return Verdict(ONE_OF, named, f"no single one reaches {SURE}; these hold 90 % of the probability")
