@@ -20,6 +20,7 @@ from pipeline.options import (
     CameraScale,
     CmodRate,
     Config,
+    Dask,
     Debug,
     DeltaMax,
     Effect,
@@ -35,6 +36,7 @@ from pipeline.options import (
     ObjectiveChoice,
     Out,
     Radius,
+    Ranks,
     Record,
     Scale,
     Seed,
@@ -153,6 +155,7 @@ def simulate(
     effect: Effect = None,
     config: Config = None,
     workers: Workers = None,
+    ranks: Ranks = None,
     seed: Seed = None,
     debug: Debug = False,
 ) -> None:
@@ -170,6 +173,7 @@ def simulate(
                 engine=engine,
                 radius_mm=radius_mm,
                 accuracy=accuracy,
+                ranks=ranks,
                 config=config,
                 progress=progress,
             )
@@ -192,6 +196,8 @@ def identify(
     ] = False,
     config: Config = None,
     workers: Workers = None,
+    ranks: Ranks = None,
+    dask: Dask = None,
     seed: Seed = None,
     debug: Debug = False,
 ) -> None:
@@ -213,6 +219,8 @@ def identify(
                 levelling=levelling or None,
                 config=config,
                 workers=workers,
+                ranks=ranks,
+                dask=dask,
                 seed=seed,
                 progress=progress,
             )

@@ -51,6 +51,12 @@ class RunSettings(BaseModel):
     workers: Annotated[int, Field(ge=1, le=4096)] | None = Field(
         default=None, description="simulations at a time; absent: as many as there are processors"
     )
+    dask: Annotated[str, Field(pattern=r"^(tcp|tls|ws|wss)://[A-Za-z0-9_.:\[\]-]+$")] | None = Field(
+        default=None, description="address of a dask scheduler whose workers simulate; absent: this machine does"
+    )
+    ranks: Annotated[int, Field(ge=1, le=4096)] = Field(
+        default=1, description="MPI ranks of one simulation by LAMMPS; times workers no more than there are processors"
+    )
     seed: Annotated[int, Field(ge=0, lt=2**63)] = Field(default=0, description="of everything random")
     radius_mm: Annotated[float, Field(ge=1e-3, le=20)] | None = Field(
         default=None, description="particle radius instead of the bundle's; f_max/(2 r t) is kept"

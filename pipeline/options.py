@@ -174,6 +174,12 @@ Config = Annotated[Path | None, option("--config", metavar="FILE", help="Setting
 Workers = Annotated[
     int | None, option("--workers", metavar="N", min=1, help="Processes at a time; as many as processors.")
 ]
+Dask = Annotated[
+    str | None, option("--dask", metavar="tcp://HOST:PORT", help="Let the workers of this dask scheduler simulate.")
+]
+Ranks = Annotated[
+    int | None, option("--ranks", metavar="N", min=1, max=4096, help="MPI ranks of one simulation (default: 1).")
+]
 Seed = Annotated[int | None, option("--seed", metavar="N", min=0, help="Seed of everything random (default: 0).")]
 Effect = Annotated[
     list[Any] | None,

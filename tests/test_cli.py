@@ -174,6 +174,7 @@ def test_options_reach_the_study(study):
         "3",
     ]
     more = ["--accuracy", "0.02", "--fields", "f.h5", "--config", "c.toml", "--workers", "2", "--levelling"]
+    more += ["--ranks", "4", "--dask", "tcp://head:8786"]
     assert run("identify", "B", "-o", "O", *options, *more).exit_code == 0
     told = dict(study.options)
     assert study.args == (Path("B"), Path("O"))
@@ -188,6 +189,8 @@ def test_options_reach_the_study(study):
         "levelling": True,
         "config": Path("c.toml"),
         "workers": 2,
+        "ranks": 4,
+        "dask": "tcp://head:8786",
         "seed": 3,
     }
 

@@ -91,7 +91,7 @@ class LocalProcesses(Executor):
         try:
             return self._start(self._lay_down(call)).result()
         except ProcessExpired as error:
-            raise WorkerLostError(_epitaph(error.exitcode)) from error
+            raise WorkerLostError(epitaph(error.exitcode)) from error
         except BrokenPipeError as error:
             raise WorkerLostError("the process of this simulation was lost while it started") from error
 
@@ -124,7 +124,7 @@ class LocalProcesses(Executor):
             return concurrent.process(name=self._name, context=context)(_serve)(call)  # type: ignore[call-overload]
 
 
-def _epitaph(exitcode: int | None) -> str:
+def epitaph(exitcode: int | None) -> str:
     """How a process ended, in a sentence."""
     if exitcode is None or exitcode >= 0:
         return f"the process of this simulation ended without a result (exit code {exitcode})"

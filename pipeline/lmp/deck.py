@@ -16,13 +16,20 @@ from pipeline.lmp.law_table import LawTable, law_table
 DECK = "fracture.lmp"
 
 
-def write_deck(folder: Path, problem: Problem) -> Loading:
-    """Write a folder in which `lmp -in fracture.lmp` runs the problem; the loading it will use."""
+def write_deck(folder: Path, problem: Problem, stretch: int = 0) -> Loading:
+    """Write a folder in which `lmp -in fracture.lmp` runs the problem; the loading it will use.
+
+    Parameters
+    ----------
+    folder : Path
+    problem : Problem
+    stretch : int; steps from one restart file to the next, a multiple of the steps between records; 0: none
+    """
     table = law_table(problem)
     modes = lowest_modes(problem)
     loading = loading_rule(problem, modes)
     write_data_file(folder / "specimen.data", problem, table, loading.first_rate * modes.response)
-    (folder / "settings.inc").write_text(_settings(problem, loading), encoding="ascii")
+    (folder / "settings.inc").write_text(_settings(problem, loading, stretch), encoding="ascii")
     (folder / "bonds.inc").write_text(_coefficients(table), encoding="ascii")
     (folder / "attachments.inc").write_text(_attachments(problem), encoding="ascii")
     (folder / "drive.inc").write_text(_drive(problem, loading, modes), encoding="ascii")
@@ -37,7 +44,7 @@ def deck_source() -> Traversable:
     return packed if packed.is_dir() else Path(__file__).resolve().parents[2] / "lammps_inputs"
 
 
-def _settings(problem: Problem, loading: Loading) -> str:
+def _settings(problem: Problem, loading: Loading, stretch: int) -> str:
     radius = problem.particles.radius
     values = {
         "kinematics": problem.kinematics.value,
@@ -47,6 +54,7 @@ def _settings(problem: Problem, loading: Loading) -> str:
         "skin": f"{2 * radius:.9g}",
         "record": str(loading.record),
         "steps_max": str(loading.steps_max),
+        "stretch": str(loading.record * -(-stretch // loading.record)),
     }
     return "".join(f"variable {name} index {value}\n" for name, value in values.items())
 

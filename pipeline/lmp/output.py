@@ -1,7 +1,13 @@
-"""What a LAMMPS run left in its folder, read back."""
+"""What a LAMMPS run left in its folder, read back.
+
+A run that was killed and went on from its restart file of step S leaves parts: curve.txt and frames.dump up to the
+kill, curve-S.txt and frames-S.dump from S on. What a part holds behind the step at which the next one begins is void.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +16,34 @@ from pipeline.core.errors import StoreError
 from pipeline.explicit.frames import Frame
 
 
+def parts(path: Path) -> list[tuple[Path, float]]:
+    """The parts of an output file in the order of the run, each with the step behind which it is void."""
+    begins = {0: path}
+    for part in path.parent.glob(f"{path.stem}-*{path.suffix}"):
+        if found := re.fullmatch(rf"{path.stem}-([1-9]\d*)", part.stem):
+            begins[int(found[1])] = part
+    order = sorted(begins)
+    return [(begins[k], end) for k, end in zip(order, [*order[1:], math.inf], strict=True)]
+
+
 def read_curve(path: Path) -> dict[str, np.ndarray]:
-    """Columns of curve.txt by name."""
-    with path.open(encoding="ascii") as lines:
-        names = lines.readline().split()
-        table = _numbers(lines.read(), len(names), path)
-    if len(table) < 3:
-        raise StoreError(f"{path} holds {len(table)} rows, expected at least 3: the run ended at its start")
+    """Columns of curve.txt and its parts by name, one row a record."""
+    rows: dict[float, np.ndarray] = {}
+    for part, end in parts(path):
+        names, table = _table(part, end)
+        rows |= {row[0]: row for row in table if row[0] <= end and row[0] not in rows}
+    if len(rows) < 3:
+        raise StoreError(f"{path} holds {len(rows)} rows, expected at least 3: the run ended at its start")
+    table = np.array([rows[step] for step in sorted(rows)])
     return dict(zip(names, table.T, strict=True))
+
+
+def _table(path: Path, end: float) -> tuple[list[str], np.ndarray]:
+    """Names and rows of one part; its last line may be cut off where the part is void there."""
+    names, _, text = path.read_text(encoding="ascii").partition("\n")
+    if end < math.inf:
+        text = text[: text.rfind("\n") + 1]
+    return names.split(), _numbers(text, len(names.split()), path)
 
 
 def _numbers(text: str, columns: int, path: Path) -> np.ndarray:
@@ -29,9 +55,17 @@ def _numbers(text: str, columns: int, path: Path) -> np.ndarray:
 
 
 def read_frames(path: Path, count: int) -> list[Frame]:
-    """All frames of frames.dump for `count` particles, sorted by particle."""
-    text = path.read_text(encoding="ascii")
-    return [_frame(part, count, path) for part in text.split("ITEM: TIMESTEP\n")[1:]]
+    """All frames of frames.dump and its parts for `count` particles, sorted by particle."""
+    frames: dict[int, Frame] = {}
+    for part, end in parts(path):
+        for text in part.read_text(encoding="ascii").split("ITEM: TIMESTEP\n")[1:] if part.exists() else ():
+            step, newline, _ = text.partition("\n")
+            if end < math.inf and not (newline and int(step) <= end):
+                break
+            frames.setdefault(int(step), _frame(text, count, part))
+    if not path.exists():
+        raise StoreError(f"{path} does not exist: run the simulation again")
+    return [frames[step] for step in sorted(frames)]
 
 
 def _frame(part: str, count: int, path: Path) -> Frame:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.core.curve import LoadCurve
@@ -36,12 +37,17 @@ def solve(problem: Problem, folder: Path | None = None) -> Solution:
     ToolchainError
         if LAMMPS or the compiled style is missing
     """
+    return in_folder(folder, lambda place: _solve_in(problem, place))
+
+
+def in_folder(folder: Path | None, solve_in: Callable[[Path], Solution]) -> Solution:
+    """Solve in a folder that is made, or in a temporary one; errors of files become errors of the package."""
     try:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            return _solve_in(problem, folder)
+            return solve_in(folder)
         with tempfile.TemporaryDirectory(prefix="cohesive-bpm-") as temporary:
-            return _solve_in(problem, Path(temporary))
+            return solve_in(Path(temporary))
     except StoreError:
         raise
     except FileNotFoundError as error:

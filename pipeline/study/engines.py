@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.metadata
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from pipeline import __version__
-from pipeline.core.errors import UnavailableError
+from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import Problem, Solution
 
 
@@ -27,20 +28,34 @@ class Engine:
     expectation: Callable[[Problem], str] | None = None
 
 
-def engine(name: str) -> Engine:
+def engine(name: str, ranks: int = 1) -> Engine:
     """The engine of that name.
+
+    Parameters
+    ----------
+    name : str
+    ranks : int; MPI ranks of one simulation, of LAMMPS only. Its solutions are kept under the same label: they
+        differ by the order of sums alone
 
     Raises
     ------
     UnavailableError
         for an engine that this version does not have
+    InputError
+        for ranks of an engine that has none
     """
+    if ranks > 1 and name != "lammps":
+        raise InputError(f"ranks = {ranks}: engine {name} runs in one process, leave --ranks out or use lammps")
     if name == "lammps":
         from pipeline.lmp import plugin, simulate
+        from pipeline.lmp.ranks import launcher, solve_on_ranks
 
         plugin.library()  # refuses before any work is done
-        version = importlib.metadata.version("lammps")
-        return Engine(f"lammps {version}, cohesive-bpm {__version__}", simulate.solve)
+        label = f"lammps {importlib.metadata.version('lammps')}, cohesive-bpm {__version__}"
+        if ranks == 1:
+            return Engine(label, simulate.solve)
+        launcher()
+        return Engine(label, partial(solve_on_ranks, ranks=ranks))
     if name == "equilibrium":
         from pipeline.equilibrium import solve
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from pipeline.core.errors import StoreError
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import ligament_area
 from pipeline.core.units import MM
+from pipeline.execution.dask_workers import executor_of
 from pipeline.execution.progress import Progress, Silent
 from pipeline.execution.simulations import run_all
 from pipeline.inverse.design import Design
@@ -56,6 +58,7 @@ class Campaign:
     progress : Progress
     used : keys of the simulations that took part so far; the store may hold others
     leveller : Leveller, or None: simulations are observed as they are
+    executor : Executor, or None: processes of this machine
     """
 
     model: Model
@@ -67,6 +70,7 @@ class Campaign:
     progress: Progress
     used: set[str]
     leveller: Leveller | None = None
+    executor: Executor | None = None
 
     def problem(self, f_max: float, delta_max: float) -> Problem:
         """The test at one node of the grid."""
@@ -80,7 +84,13 @@ class Campaign:
             key = problem_key(problem, self.engine.label)
             wanted[key], names[key] = problem, f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
         run_all(
-            self.engine.solve, wanted, self.store, workers=self.settings.workers, progress=self.progress, names=names
+            self.engine.solve,
+            wanted,
+            self.store,
+            executor=self.executor,
+            workers=self.settings.workers,
+            progress=self.progress,
+            names=names,
         )
         self.used.update(wanted)
         return self.kept(nodes)
@@ -124,6 +134,8 @@ def identify(
     levelling: bool | None = None,
     config: Path | None = None,
     workers: int | None = None,
+    ranks: int | None = None,
+    dask: str | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -140,15 +152,28 @@ def identify(
     """
     started = time.monotonic()
     options = {"engine": engine, "grid": grid, "objective": objective, "radius_mm": radius_mm}
-    options |= {"accuracy": accuracy, "workers": workers, "seed": seed, "levelling": levelling or None}
+    options |= {"accuracy": accuracy, "workers": workers, "ranks": ranks, "dask": dask, "seed": seed}
+    options |= {"levelling": levelling or None}
     settings = settings_of(config, **options)
-    chosen = engine_of(settings.engine)
     read = read_bundle(bundle, fields)
+    progress = progress or Silent()
+    with executor_of(settings.dask) as executor:
+        campaign, aim, folder = prepare(read, out, settings, progress, executor)
+        found = search(campaign, aim)
+        problem, optimum = run_optimum(campaign, found)
+    return conclude(campaign, folder, found, problem, optimum, time.monotonic() - started)
+
+
+def prepare(
+    read: Bundle, out: Path, settings: RunSettings, progress: Progress, executor: Executor | None = None
+) -> tuple[Campaign, Objective, Path]:
+    """Everything that an estimation needs before the first simulation: campaign, objective and folder of results."""
+    chosen = engine_of(settings.engine, settings.ranks)
     aim = choose_objective(read, settings.objective)
     refuse_unlevelled(read, settings, aim)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
-    model = from_images(model, aim, folder, settings, progress or Silent())
+    model = from_images(model, aim, folder, settings, progress)
     read = model.bundle
     field = read.need_fields() if aim is not Objective.LOAD else None
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
@@ -156,13 +181,18 @@ def identify(
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(prepare_output(folder / "simulations"))
     level = leveller(read, settings, points, folder, chosen.label) if settings.levelling else None
-    campaign = Campaign(model, measured, points, settings, chosen, store, progress or Silent(), set(), level)
-    found = search(campaign, aim)
-    problem, optimum = run_optimum(campaign, found)
-    result = identification_result(campaign, found, problem, optimum, time.monotonic() - started)
+    campaign = Campaign(model, measured, points, settings, chosen, store, progress, set(), level, executor)
+    return campaign, aim, folder
+
+
+def conclude(
+    campaign: Campaign, folder: Path, found: Estimate, problem: Problem, optimum: Solution, seconds: float
+) -> str:
+    """Write result.json, results.h5, figures and report of an estimate; the sentence to print."""
+    result = identification_result(campaign, found, problem, optimum, seconds)
     write_arrays(folder, IDENTIFY, identification_arrays(campaign, found, optimum))
     write_result(folder, result)
-    identification_page(folder, model, measured, found, problem, optimum, result)
+    identification_page(folder, campaign.model, campaign.measured, found, problem, optimum, result)
     return _summary(found, campaign.model.remarks)
 
 

@@ -37,6 +37,7 @@ def simulate(
     engine: str | None = None,
     radius_mm: float | None = None,
     accuracy: float | None = None,
+    ranks: int | None = None,
     config: Path | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -47,10 +48,10 @@ def simulate(
     bundle, out : folders
     f_max : float, N, per bond of the bundle's lattice
     delta_max : float, m
-    engine, radius_mm, accuracy : override the settings of `config`
+    engine, radius_mm, accuracy, ranks : override the settings of `config`
     """
-    settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy)
-    chosen = engine_of(settings.engine)
+    settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy, ranks=ranks)
+    chosen = engine_of(settings.engine, settings.ranks)
     read = read_bundle(bundle)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
