@@ -17,7 +17,7 @@ from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.equilibrium.solve import solve as find_equilibria
 from pipeline.execution.progress import Progress, Silent
-from pipeline.microstructure.gradation import fuller_section
+from pipeline.microstructure.gradation import Grading, fuller_section
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.experiment import Experiment
@@ -190,13 +190,15 @@ def with_image(experiment: Experiment, request: Request) -> tuple[Experiment, Co
     return _with_frame(experiment, frame), contents
 
 
-def with_section(experiment: Experiment, rng: np.random.Generator) -> tuple[Experiment, Contents]:
+def with_section(
+    experiment: Experiment, rng: np.random.Generator, grading: Grading | None = None
+) -> tuple[Experiment, Contents]:
     """A graded section drawn by chance, as label image."""
     specimen: Specimen = experiment.specimen.specimen()
     x0, y0, x1, y1 = specimen.bounds
     pitch, margin = SECTION_MM_PER_PX * MM, SECTION_MARGIN_PX
     columns, rows = (round(size / pitch) + 1 + 2 * margin for size in (x1 - x0, y1 - y0))
-    section = fuller_section(columns * pitch, rows * pitch, pitch, rng)
+    section = fuller_section(columns * pitch, rows * pitch, pitch, rng, grading)
     frame = {
         "mm_per_px": SECTION_MM_PER_PX,
         "origin_px": [margin - float(f"{x0 / pitch:.9g}"), rows - 1 - margin + float(f"{y0 / pitch:.9g}")],
