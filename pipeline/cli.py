@@ -35,6 +35,7 @@ from pipeline.options import (
     NoisePx,
     ObjectiveChoice,
     Out,
+    Placements,
     Radius,
     Ranks,
     Record,
@@ -194,6 +195,7 @@ def identify(
     levelling: Annotated[
         bool, option("--levelling", help="Correlate simulated fields as the measured ones were.")
     ] = False,
+    placements: Placements = None,
     config: Config = None,
     workers: Workers = None,
     ranks: Ranks = None,
@@ -217,6 +219,7 @@ def identify(
                 accuracy=accuracy,
                 fields=fields,
                 levelling=levelling or None,
+                placements=placements,
                 config=config,
                 workers=workers,
                 ranks=ranks,

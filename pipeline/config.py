@@ -78,8 +78,10 @@ class RunSettings(BaseModel):
         default="data",
         description="what is interpolated over the grid: every simulated number, or the objective, as in the paper",
     )
-    refinement_count: Annotated[int, Field(ge=0, le=4)] = Field(
-        default=0, description="how often the grid may be halved around an optimum that it does not resolve"
+    placement_count: Annotated[int, Field(ge=0, le=100)] = Field(
+        default=6,
+        description="other placements of the lattice that are simulated at the optimum and averaged; their scatter "
+        "is in the interval",
     )
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,

@@ -169,6 +169,15 @@ Accuracy = Annotated[
     float | None,
     option("--accuracy", metavar="E", parser=positive, help="Quasi-static error asked for, relative (default: 0.01)."),
 ]
+Placements = Annotated[
+    int | None,
+    option(
+        "--placements",
+        metavar="N",
+        min=0,
+        help="Other placements of the lattice, averaged at the optimum (default: 6).",
+    ),
+]
 Fields = Annotated[Path | None, option("--fields", metavar="FILE", help="Displacement fields instead of the bundle's.")]
 Config = Annotated[Path | None, option("--config", metavar="FILE", help="Settings of the run (TOML).")]
 Workers = Annotated[

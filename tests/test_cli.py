@@ -175,6 +175,7 @@ def test_options_reach_the_study(study):
     ]
     more = ["--accuracy", "0.02", "--fields", "f.h5", "--config", "c.toml", "--workers", "2", "--levelling"]
     more += ["--ranks", "4", "--dask", "tcp://head:8786"]
+    more += ["--placements", "3"]
     assert run("identify", "B", "-o", "O", *options, *more).exit_code == 0
     told = dict(study.options)
     assert study.args == (Path("B"), Path("O"))
@@ -187,6 +188,7 @@ def test_options_reach_the_study(study):
         "accuracy": 0.02,
         "fields": Path("f.h5"),
         "levelling": True,
+        "placements": 3,
         "config": Path("c.toml"),
         "workers": 2,
         "ranks": 4,

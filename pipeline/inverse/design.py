@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -69,15 +68,6 @@ class Design:
             steps * _side(delta_max, self.delta_max),
         )
 
-    def refined(self, f_max: float, delta_max: float) -> Design:
-        """As many lines at half their distance around a point; lines that both grids hold stay the same to the bit."""
-        centre = self.centre
-        return replace(
-            self,
-            f_factors=_halved(self.f_factors, f_max / centre[0]),
-            delta_factors=_halved(self.delta_factors, delta_max / centre[1]),
-        )
-
     def is_edge(self, f_max: float, delta_max: float) -> bool:
         """Whether a point lies on the grid's edge or outside it."""
         return any((_side(f_max, self.f_max), _side(delta_max, self.delta_max)))
@@ -92,14 +82,6 @@ def _moved(factors: tuple[float, ...], steps: int) -> tuple[float, ...]:
             break
         line = [*line[1:], new] if steps > 0 else [new, *line[:-1]]
     return tuple(line)
-
-
-def _halved(factors: tuple[float, ...], at: float) -> tuple[float, ...]:
-    """As many of the factors and their midpoints as there are factors, the middle one nearest to `at`."""
-    line = np.sort([*factors, *(round((a + b) / 2, 12) for a, b in pairwise(factors))])
-    first = int(np.argmin(np.abs(line - at))) - len(factors) // 2
-    first = min(max(first, 0), len(line) - len(factors))
-    return tuple(float(x) for x in line[first : first + len(factors)])
 
 
 def _side(value: float, lines: np.ndarray) -> int:

@@ -13,6 +13,7 @@ from pipeline.inverse.discrepancy import Discrepancy
 from pipeline.inverse.newton import Minimum, minimise
 from pipeline.inverse.objective import Comparison, Objective, Rigid, compare, differences, left_out
 from pipeline.inverse.observations import Measured, Simulated
+from pipeline.inverse.placements import Placements
 from pipeline.inverse.resolution import data_minimum, resolves
 from pipeline.inverse.squares import SquaredDifference
 from pipeline.inverse.surrogate import LagrangeSurrogate, leave_one_out
@@ -153,7 +154,13 @@ class Estimate:
         return (*found, *self.left_out)
 
 
-def estimate(design: Design, simulated: Simulated, measured: Measured, settings: Settings) -> Estimate:
+def estimate(
+    design: Design,
+    simulated: Simulated,
+    measured: Measured,
+    settings: Settings,
+    placements: Placements | None = None,
+) -> Estimate:
     """The paper's inverse estimation on a grid of simulations that have already been run.
 
     Φ at the nodes (eq. 5), its Lagrange multinomial and Newton's method from every node (eq. 6), then the
@@ -165,12 +172,16 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     simulated : Simulated; one entry a node
     measured : Measured
     settings : Settings
+    placements : Placements near the optimum, whose mean then stands for the grid's one lattice, or None
 
     Raises
     ------
     InputError
         if measurement and simulations have too little in common
     """
+    if placements is not None:
+        placements = placements.comparable(measured)
+        simulated = placements.averaged(simulated)
     comparison = compare(measured, simulated, settings.objective, settings.rigid)
     objective, features = differences(comparison, simulated)
     surrogate = LagrangeSurrogate(design.f_max, design.delta_max, objective)
@@ -181,7 +192,8 @@ def estimate(design: Design, simulated: Simulated, measured: Measured, settings:
     best, *others = minimise(valley, nodes)
     loo_error = float(np.sqrt(np.mean(leave_one_out(surrogate) ** 2)))
     displacement, load = (_interpolated(design, a) for a in (simulated.displacement, simulated.load))
-    fit = Fit(comparison, surrogate, interpolated, load, best, by_data)
+    placed = None if placements is None else placements.deviations(comparison)
+    fit = Fit(comparison, surrogate, interpolated, load, best, by_data, placed)
     data_objective = float(np.sum(fit.residual**2))
     data_position = data_minimum(fit)
     refused = refusal(best, float(objective.min()), data_objective, loo_error)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.field import rigid_motion
+from pipeline.inverse.flanks import changed_flank
 from pipeline.inverse.observations import Measured, Simulated
 
 
@@ -170,7 +171,8 @@ def left_out(comparison: Comparison) -> tuple[str, ...]:
         if missing:
             found.append(
                 f"{missing} of {comparison.use_field.size} displacement vectors are missing in the measurement or in a "
-                f"simulation and are left out of all ({whole} of {stations} stations wholly)."
+                "simulation, or lie on another side of the crack there, and are left out of all "
+                f"({whole} of {stations} stations wholly)."
             )
     if comparison.objective is not Objective.FIELDS:
         missing = comparison.use_load.size - int(comparison.use_load.sum())
@@ -187,8 +189,11 @@ def _common_field(measured: Measured, simulated: Simulated) -> np.ndarray:
     shape = measured.field.valid.shape
     if simulated.displacement.shape[2:] != (*shape, 2):
         raise InputError(f"simulated fields have shape {simulated.displacement.shape[2:]}, measured ones {(*shape, 2)}")
-    measured_ok = measured.field.valid & np.isfinite(measured.field.displacement).all(axis=-1)
-    return measured_ok & np.isfinite(simulated.displacement).all(axis=(0, 1, 4))
+    field = measured.field
+    measured_ok = field.valid & np.isfinite(field.displacement).all(axis=-1)
+    seen = np.where(measured_ok[..., None], field.displacement, np.nan)
+    other = changed_flank(field.points, seen, field.std, simulated.displacement)
+    return measured_ok & ~other & np.isfinite(simulated.displacement).all(axis=(0, 1, 4))
 
 
 def _common_load(measured: Measured, simulated: Simulated) -> np.ndarray:

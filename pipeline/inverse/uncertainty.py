@@ -120,6 +120,7 @@ class Fit:
     load : LagrangeSurrogate of the simulated loads (n_f, n_d, s), or None
     minimum : Minimum of the surrogate, or of Φ of the interpolated features
     by_data : bool; which of the two
+    placed : (k, N) array; features of k placements of the lattice minus their mean, or None: one was used
     """
 
     comparison: Comparison
@@ -128,6 +129,7 @@ class Fit:
     load: LagrangeSurrogate | None
     minimum: Minimum
     by_data: bool = False
+    placed: np.ndarray | None = None
 
     @property
     def slopes(self) -> np.ndarray:
@@ -171,6 +173,10 @@ def uncertainty(fit: Fit, discrepancy: Discrepancy, modulus_std: float, confiden
     found = waves(fit.comparison, discrepancy, fit.residual, fit.slopes)
     budget = [_noise(fit), *(_discrepancy(fit, wave, discrepancy) for wave in found), _scatter(fit)]
     lacks = ["errors of geometry, gauge and load cell"]
+    if fit.placed is None:
+        lacks.append("where the lattice lies against the stones: only one placement was simulated")
+    else:
+        budget.append(_placement(fit, fit.placed))
     if modulus_std > 0:
         budget.append(_modulus(fit, modulus_std))
     else:
@@ -222,6 +228,19 @@ def _discrepancy(fit: Fit, wave: Wave, setting: Discrepancy) -> Contribution:
         f"difference between model and specimen of {size}, correlated over {setting.length * 1e3:g} mm of CMOD ({how})"
     )
     return Contribution(f"discrepancy_{wave.kind}", sentence, moved @ moved.T, wave.freedom)
+
+
+def _placement(fit: Fit, placed: np.ndarray) -> Contribution:
+    """Where particles lie against the stones: the specimen is one more placement beside those that were averaged."""
+    count = len(placed)
+    moves = placed @ fit.response.T
+    covariance = (1 + 1 / count) * (moves.T @ moves) / (count - 1)
+    share = np.sqrt(np.diag(covariance)) / fit.minimum.position
+    sentence = (
+        f"where the lattice lies against the stones, {share[0]:.2g} of f_max, {share[1]:.2g} of delta_max over "
+        f"{count} placements"
+    )
+    return Contribution("placement", sentence, covariance, float(count - 1))
 
 
 def _modulus(fit: Fit, relative: float) -> Contribution:

@@ -97,6 +97,10 @@ class Model:
             cmod_rate=self.bundle.loading.cmod_rate,
         )
 
+    def placed(self, shift: tuple[float, float]) -> Model:
+        """The same specimen on the same lattice moved by a shift (2,), m."""
+        return _packed(self.bundle, self.phase_map, self.mixture, self.particles.radius, (), shift)
+
 
 def build_model(bundle: Bundle, radius: float | None = None) -> Model:
     """Read the specimen's image, pack particles, lay phases, attach grips and gauge.
@@ -113,12 +117,24 @@ def build_model(bundle: Bundle, radius: float | None = None) -> Model:
     """
     refuse_untold(bundle)
     phase_map, remarks = read_phases(bundle)
-    packing = hexagonal_packing(bundle.specimen, radius or bundle.model.radius, bundle.model.lattice_angle)
-    particles, bonds, report = lay_phases(bundle.specimen, packing, phase_map)
-    remark = gauge_remark(bundle.specimen, particles)
     material = mixture(bundle, radius)
     if bundle.material.mastic_modulus is None:
         remarks += (f"modulus of the mastic {material.mastic_modulus / GPA:.4g} GPa, 1/D₁ of {creep.FILE}",)
+    return _packed(bundle, phase_map, material, radius or bundle.model.radius, remarks)
+
+
+def _packed(
+    bundle: Bundle,
+    phase_map: PhaseMap | None,
+    material: Mixture,
+    radius: float,
+    remarks: tuple[str, ...],
+    shift: tuple[float, float] = (0.0, 0.0),
+) -> Model:
+    """Particles and bonds of a specimen whose phases are known, with what has to be said of them."""
+    packing = hexagonal_packing(bundle.specimen, radius, bundle.model.lattice_angle, shift)
+    particles, bonds, report = lay_phases(bundle.specimen, packing, phase_map)
+    remark = gauge_remark(bundle.specimen, particles)
     if report.islands or report.loose:
         remarks += (f"{report.islands + report.loose} particles did not hold to the specimen and were left out",)
     return Model(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import StoreError
+from pipeline.core.errors import InputError, StoreError
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import ligament_area
 from pipeline.core.units import MM
@@ -23,6 +25,8 @@ from pipeline.inverse.design import Design
 from pipeline.inverse.estimate import Estimate, Settings, Surrogate, estimate
 from pipeline.inverse.objective import Objective, Rigid
 from pipeline.inverse.observations import Measured, Simulated
+from pipeline.inverse.placements import Placements
+from pipeline.microstructure.packing import Lattice
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.layouts import IDENTIFY
 from pipeline.store.problem_key import problem_key
@@ -41,6 +45,8 @@ from pipeline.study.output import results_folder
 from pipeline.study.pages import identification_page
 from pipeline.study.prospects import refuse_hopeless
 from pipeline.study.simulate import cmod_energy, curve_result
+
+TRIES = 5  # placements looked at for each that is wanted
 
 
 @dataclass(frozen=True)
@@ -78,11 +84,13 @@ class Campaign:
 
     def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """Simulate the nodes that the store does not hold; all of them, in order."""
-        wanted, names = {}, {}
-        for f_max, delta_max in nodes:
-            problem = self.problem(f_max, delta_max)
-            key = problem_key(problem, self.engine.label)
-            wanted[key], names[key] = problem, f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
+        return self.solved([(_told(*node), self.problem(*node)) for node in nodes])
+
+    def solved(self, problems: list[tuple[str, Problem]]) -> list[tuple[Problem, Solution]]:
+        """Simulate the named problems that the store does not hold; all of them, in order."""
+        keys = [problem_key(problem, self.engine.label) for _, problem in problems]
+        wanted = {key: problem for key, (_, problem) in zip(keys, problems, strict=True)}
+        names = {key: name for key, (name, _) in zip(keys, problems, strict=True)}
         run_all(
             self.engine.solve,
             wanted,
@@ -93,7 +101,7 @@ class Campaign:
             names=names,
         )
         self.used.update(wanted)
-        return self.kept(nodes)
+        return [(problem, self._read(key)) for key, (_, problem) in zip(keys, problems, strict=True)]
 
     def seen(self, runs: list[tuple[Problem, Solution]]) -> list[np.ndarray]:
         """Displacements (s, p, 2) in m of the points at the stations, one array a simulation."""
@@ -111,14 +119,18 @@ class Campaign:
 
     def kept(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """The nodes as the store holds them, in order; refuses where one is missing."""
-        found = []
-        for problem in (self.problem(*node) for node in nodes):
-            key = problem_key(problem, self.engine.label)
-            solution = self.store.get(key)
-            if solution is None:
-                raise StoreError(f"{self.store.path(key)} cannot be read back: give the same command again")
-            found.append((problem, solution))
-        return found
+        problems = [self.problem(*node) for node in nodes]
+        return [(problem, self._read(problem_key(problem, self.engine.label))) for problem in problems]
+
+    def _read(self, key: str) -> Solution:
+        solution = self.store.get(key)
+        if solution is None:
+            raise StoreError(f"{self.store.path(key)} cannot be read back: give the same command again")
+        return solution
+
+
+def _told(f_max: float, delta_max: float) -> str:
+    return f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
 
 
 def identify(
@@ -132,6 +144,7 @@ def identify(
     accuracy: float | None = None,
     fields: Path | None = None,
     levelling: bool | None = None,
+    placements: int | None = None,
     config: Path | None = None,
     workers: int | None = None,
     ranks: int | None = None,
@@ -148,12 +161,13 @@ def identify(
     bundle, out : folders
     fields : a field file instead of the bundle's own
     levelling : send simulated fields through the correlation before they are compared
+    placements : other placements of the lattice that are averaged at the optimum
     the others : override the settings of `config`
     """
     started = time.monotonic()
     options = {"engine": engine, "grid": grid, "objective": objective, "radius_mm": radius_mm}
     options |= {"accuracy": accuracy, "workers": workers, "ranks": ranks, "dask": dask, "seed": seed}
-    options |= {"levelling": levelling or None}
+    options |= {"levelling": levelling or None, "placement_count": placements}
     settings = settings_of(config, **options)
     read = read_bundle(bundle, fields)
     progress = progress or Silent()
@@ -219,37 +233,58 @@ def from_images(model: Model, aim: Objective, folder: Path, settings: RunSetting
 
 
 def search(campaign: Campaign, aim: Objective) -> Estimate:
-    """Estimate on the grid; halve it around an optimum that it does not resolve, and estimate again."""
+    """Estimate on the grid, then again with the mean of several placements of its lattice near the optimum."""
     settings = campaign.settings
     start = Design(start_parameters(campaign.model.bundle), settings.f_factors, settings.delta_factors)
     campaign.progress.stage(f"{np.prod(start.shape)} simulations")
     found = centred(campaign, start, aim)
-    for halving in range(settings.refinement_count):
-        if found.resolved or not found.interior:
-            break
-        campaign.progress.stage(f"grid halved around the optimum, {halving + 1} of at most {settings.refinement_count}")
-        finer = centred(campaign, found.design.refined(*found.data_position), aim)
-        if found.accepted and not finer.accepted:
-            break
-        found = finer
-    return found
+    if not (settings.placement_count and found.accepted):
+        return found
+    campaign.progress.stage(f"{settings.placement_count} other placements of the lattice")
+    return centred(campaign, found.design, aim, placed_elsewhere(campaign, found, aim))
 
 
-def centred(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
+def placed_elsewhere(campaign: Campaign, found: Estimate, aim: Objective) -> Placements:
+    """Simulate the optimum on the grid's lattice and on others of its kind that lie elsewhere."""
+    model, settings = campaign.model, campaign.settings
+    models = [model, *elsewhere(model, settings.placement_count)]
+    runs = campaign.solved(
+        [
+            (f"placement {k} of the lattice", one.problem(found.f_max, found.delta_max, accuracy=settings.accuracy))
+            for k, one in enumerate(models)
+        ]
+    )
+    seen = None if aim is Objective.LOAD else np.stack(campaign.seen(runs))
+    return Placements(seen, np.stack([solution.curve.load_at(campaign.measured.cmod) for _, solution in runs]))
+
+
+def elsewhere(model: Model, count: int) -> Iterator[Model]:
+    """The specimen on `count` placements of its lattice; one that leaves a grip too few particles is passed over."""
+    lattice = Lattice(model.particles.radius, model.bundle.model.lattice_angle)
+    built = 0
+    for shift in lattice.placements(TRIES * count):
+        with suppress(InputError):
+            yield model.placed(shift)
+            built += 1
+        if built == count:
+            return
+
+
+def centred(campaign: Campaign, design: Design, aim: Objective, placed: Placements | None = None) -> Estimate:
     """Estimate on a grid; where the optimum lies on its edge, move the grid and estimate again."""
     settings = campaign.settings
-    found = estimate_on(campaign, design, aim)
+    found = estimate_on(campaign, design, aim, placed)
     for move in range(settings.recentring_count):
         moved = design.recentred(found.f_max, found.delta_max, settings.recentring_steps)
         if moved == design:
             break
         design = moved
         campaign.progress.stage(f"grid moved, {move + 1} of at most {settings.recentring_count}")
-        found = estimate_on(campaign, design, aim)
+        found = estimate_on(campaign, design, aim, placed)
     return found
 
 
-def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
+def estimate_on(campaign: Campaign, design: Design, aim: Objective, placed: Placements | None = None) -> Estimate:
     """Simulate a grid and estimate on it."""
     runs = campaign.solutions(design.nodes())
     stations = campaign.measured.cmod
@@ -260,7 +295,7 @@ def estimate_on(campaign: Campaign, design: Design, aim: Objective) -> Estimate:
     simulated = Simulated.of(design, seen, loads)
     settings = campaign.settings
     how = Settings(aim, settings.modulus_std, Rigid(settings.rigid), surrogate=Surrogate(settings.surrogate))
-    return estimate(design, simulated, campaign.measured, how)
+    return estimate(design, simulated, campaign.measured, how, placed)
 
 
 def run_optimum(campaign: Campaign, found: Estimate) -> tuple[Problem, Solution]:

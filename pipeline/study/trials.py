@@ -87,6 +87,8 @@ def same_lattice_trial(
 ) -> Trial:
     """Identify a test that was broken on the identifying lattice itself: noise and interpolation are what remains.
 
+    The lattice lies where the test has it, so no other placements are averaged.
+
     Parameters
     ----------
     folder, seed, objective, config, how : as of `twin_trial`
@@ -95,7 +97,7 @@ def same_lattice_trial(
     bundle, out = folder / name, folder / f"identified-{name}-{objective}"
     if not (bundle / "truth.json").is_file():
         same_lattice_test(bundle, seed, Request(**how), progress or Silent())
-    return _identified(bundle, out, seed, objective, config, progress)
+    return _identified(bundle, out, seed, objective, config, progress, placements=0)
 
 
 def same_lattice_test(out: Path, seed: int, request: Request, progress: Progress) -> None:
@@ -118,9 +120,15 @@ def same_lattice_test(out: Path, seed: int, request: Request, progress: Progress
 
 
 def _identified(
-    bundle: Path, out: Path, seed: int, objective: str, config: Path | None, progress: Progress | None
+    bundle: Path,
+    out: Path,
+    seed: int,
+    objective: str,
+    config: Path | None,
+    progress: Progress | None,
+    placements: int | None = None,
 ) -> Trial:
-    identify(bundle, out, objective=objective, config=config, progress=progress)
+    identify(bundle, out, objective=objective, config=config, progress=progress, placements=placements)
     return compare(f"seed {seed}", json.loads((bundle / "truth.json").read_text("utf-8")), read_result(out))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,23 +36,6 @@ def test_an_optimum_on_an_edge_moves_the_grid_two_steps_that_way():
     assert PAPER.recentred(70.0, 1.1e-4) == PAPER
     assert PAPER.is_edge(85.2, 1.1e-4)
     assert not PAPER.is_edge(85.1, 1.1e-4)
-
-
-def test_a_halved_grid_keeps_the_nodes_around_the_optimum():
-    finer = PAPER.refined(71.9, 1.03e-4)
-    assert finer.f_factors == (0.9, 0.95, 1.0, 1.05, 1.1)
-    assert finer.delta_factors == (0.8, 0.85, 0.9, 0.95, 1.0)
-    assert len(set(finer.nodes()) & set(PAPER.nodes())) == 9  # three lines each way
-
-
-@given(st.floats(0.5, 1.5), st.floats(0.5, 1.5))
-def test_a_halved_grid_stays_inside_and_as_near_as_it_can(f, d):
-    finer = PAPER.refined(f * PAPER.centre[0], d * PAPER.centre[1])
-    for factors, at in ((finer.f_factors, f), (finer.delta_factors, d)):
-        assert min(factors) >= 0.8
-        assert max(factors) <= 1.2
-        assert np.diff(factors) == pytest.approx([0.05] * 4, rel=1e-9)  # half the paper's distance, round-off
-        assert abs(factors[2] - np.clip(at, 0.9, 1.1)) <= 0.025 + 1e-9
 
 
 def test_a_grid_never_reaches_zero():

@@ -13,6 +13,7 @@ from pipeline.inverse.objective import Objective
 
 from .hinge import CENTRE, measured, simulated
 
+HALF = (0.8, 1.0, 1.2)
 WIDE = Design(CENTRE, (0.6, 1.0, 1.4), (0.6, 1.0, 1.4))
 TRUTH = np.array([75.3, 1.07e-4])
 
@@ -31,7 +32,7 @@ def test_interpolated_data_find_the_truth_where_the_grid_is_wide():
 def test_halving_the_grid_brings_the_two_minima_together():
     """A multinomial of degree two each way errs with the third power of the distance, its slope with the square."""
     coarse = found_on(WIDE)
-    fine = found_on(WIDE.refined(*coarse.data_position))
+    fine = found_on(Design(tuple(coarse.data_position), HALF, HALF))
     apart = [np.abs(f.minimum.position - f.data_position).max() / CENTRE[0] for f in (coarse, fine)]
     assert apart[1] < apart[0] / 3  # 4 for small distances
 
