@@ -118,10 +118,10 @@ def paper_rows(
     chosen = engine_of(engine)
     model = cache(lambda geometry, known, seed: _model(folder, geometry, known, seed, radius_mm))
     problems = {
-        (geometry, known, seed): _problem(model(geometry, known, seed), geometry)
+        (geometry, own, seed): _problem(model(geometry, own, seed), geometry)
         for known in unknowns
+        for geometry, own in (("seb", known), ("dct", _without_span(known)))
         for seed in sections
-        for geometry, known in (("seb", known), ("dct", _without_span(known)))
     }
     keys = {case: problem_key(problem, chosen.label) for case, problem in problems.items()}
     wanted = {key: problems[case] for case, key in keys.items()}

@@ -44,10 +44,12 @@ def test_the_span_of_each_difference_is_found_between_rows():
 
 def test_both_tests_are_simulated_once_and_kept(tmp_path):
     unknowns = [Unknowns(span_mm=110.0), Unknowns(span_mm=92.0)]
-    [long, short] = paper_rows(tmp_path, unknowns, [1], radius_mm=2.0, engine="equilibrium", workers=1)
-    assert len(list((tmp_path / "simulations").glob("*.h5"))) == 3  # DC(T) has no span
+    two = paper_rows(tmp_path, unknowns, [1, 2], radius_mm=2.0, engine="equilibrium", workers=1)
+    assert len(list((tmp_path / "simulations").glob("*.h5"))) == 6  # DC(T) has no span
+    assert all(row.seb[0] != row.seb[1] and row.dct[0] != row.dct[1] for row in two)
+    [long, short] = two
     assert short.seb[0].peak / long.seb[0].peak == pytest.approx(110 / 92, rel=0.05)  # the moment decides
     assert short.dct == long.dct
-    again = paper_rows(tmp_path, unknowns, [1], radius_mm=2.0, engine="equilibrium", workers=1)
+    again = paper_rows(tmp_path, unknowns, [1, 2], radius_mm=2.0, engine="equilibrium", workers=1)
     assert again == [long, short]
     assert "110 mm" in paper_table(again)
