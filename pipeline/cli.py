@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
+from pipeline.cli_diagnose import diagnose
 from pipeline.cli_library import library
 from pipeline.core.errors import UnavailableError
 from pipeline.options import (
@@ -56,6 +57,7 @@ from pipeline.terminal import Display, exit_codes, finish
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(library, name="library")
+app.command()(diagnose)
 
 
 @app.callback()
@@ -163,7 +165,7 @@ def simulate(
     """Simulate one fracture test."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(law=law, effect=effect)
+            refuse_until_built(law=law)
             from pipeline.study.simulate import simulate as run
 
             summary = run(
@@ -174,6 +176,7 @@ def simulate(
                 engine=engine,
                 radius_mm=radius_mm,
                 accuracy=accuracy,
+                effect=effect,
                 ranks=ranks,
                 config=config,
                 progress=progress,
@@ -293,7 +296,7 @@ def virtual_test(
     """Make a bundle with known truth by another kind of model."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(creep=creep, effect=effect)
+            refuse_until_built(creep=creep)
             from pipeline.study.output import virtual_test_folder
             from pipeline.study.virtual_test import virtual_test as make
 
@@ -313,6 +316,7 @@ def virtual_test(
                     noise_grey=noise_grey,
                     camera_mm_per_px=camera_mm_per_px,
                     frames=frames,
+                    effect=effect,
                     workers=workers,
                     load_noise_n=load_noise_n,
                     config=config,

@@ -148,8 +148,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
     [
         (COMMANDS["identify"], ["--viscoelastic"]),
         (COMMANDS["simulate"], ["--law", "exponential"]),
-        (COMMANDS["simulate"], ["--effect", "creep=1"]),
-        (COMMANDS["virtual_test"], ["--effect", "creep=1"]),
         (COMMANDS["virtual_test"], ["--creep", "creep.csv"]),
     ],
 )
@@ -158,6 +156,22 @@ def test_what_comes_later_is_refused_by_name(study, line, option):
     assert result.exit_code == 1
     assert result.stderr == f"cohesive-bpm: not available in version {__version__}: {option[0]}; leave it out\n"
     assert study.args == ()
+
+
+@pytest.mark.parametrize("command", ["simulate", "virtual_test"])
+def test_effects_reach_the_study(study, command):
+    assert run(*COMMANDS[command], "--effect", "modulus=0.1", "--effect", "load_gain=-0.02").exit_code == 0
+    assert study.options["effect"] == [("modulus", 0.1), ("load_gain", -0.02)]
+
+
+def test_diagnose_hands_on_all_its_bundles(monkeypatch):
+    fake, module = Study(), ModuleType("pipeline.study.diagnose")
+    module.diagnose = fake
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    result = run("diagnose", "B", "C", "-o", "O", "--without", "creep", "--seed", "4")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert fake.args == ([Path("B"), Path("C")], Path("O"))
+    assert (fake.options["without"], fake.options["seed"]) == (["creep"], 4)
 
 
 def test_options_reach_the_study(study):

@@ -28,6 +28,7 @@ class Sight:
     centre : (2,) array, m; of the camera's view
     corner : float, m; distance of the corners of the view from its centre
     pull : (2,) array; unit vector along which a yielding fixture lets the specimen go
+    end_cmod : float, m; of the whole record
     contacts : (c, 2) array, m; of machine and specimen, for naming regions
     """
 
@@ -40,6 +41,7 @@ class Sight:
     centre: np.ndarray
     corner: float
     pull: np.ndarray
+    end_cmod: float
     contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:

@@ -51,16 +51,14 @@ class Plan:
     Parameters
     ----------
     specimen : Specimen
-    mixture : Mixture
+    mixture : Mixture; material, softening and ratios
     bonds : tuple of BondChange
     spent : float; share of the softening branch that bonds near the tip have behind them at the start
     spent_radius : float, m; how near
     void_share : float; of the area, in voids that no image shows
     eccentricity : float, m; of the load, from the notch line
     friction : float; Coulomb coefficient at supports or pins
-    tail : float; 0 linear softening … 1 two lines with a long tail, the area kept
     creep : float; share of D(t) − D(0) of the mastic that is left out
-    shear_strength : float; relative change of tangential to normal strength
     strength_per_decade : float; relative change of strength per decade of opening rate
     """
 
@@ -72,9 +70,7 @@ class Plan:
     void_share: float = 0.0
     eccentricity: float = 0.0
     friction: float = 0.0
-    tail: float = 0.0
     creep: float = 0.0
-    shear_strength: float = 0.0
     strength_per_decade: float = 0.0
 
     def with_bonds(self, change: BondChange) -> Plan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,12 @@ def attach_grips(specimen: Specimen, particles: Particles) -> tuple[Grip, ...]:
     InputError
         if even the deepened region holds too few particles, or only on one side of its anchor
     """
-    return tuple(_grip(region, particles) for region in specimen.grip_regions(particles.radius))
+    return attach_regions(specimen.grip_regions(particles.radius), particles)
+
+
+def attach_regions(regions: Iterable[GripRegion], particles: Particles) -> tuple[Grip, ...]:
+    """The same for grip regions that are given."""
+    return tuple(_grip(region, particles) for region in regions)
 
 
 def _grip(region: GripRegion, particles: Particles) -> Grip:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from pipeline.store.problem_key import problem_key
 from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.study.assembly import build_model, settings_of
+from pipeline.study.effects import lattice_problem, physics_effects, planned, settled
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.observation import observe_solution
 from pipeline.study.output import results_folder
@@ -38,6 +40,7 @@ def simulate(
     radius_mm: float | None = None,
     accuracy: float | None = None,
     ranks: int | None = None,
+    effect: Sequence[tuple[str, float]] | None = None,
     config: Path | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -48,14 +51,19 @@ def simulate(
     bundle, out : folders
     f_max : float, N, per bond of the bundle's lattice
     delta_max : float, m
+    effect : (name, value) pairs of physics effects; what the model leaves out
     engine, radius_mm, accuracy, ranks : override the settings of `config`
     """
+    wanted = physics_effects(effect)
     settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy, ranks=ranks)
     chosen = engine_of(settings.engine, settings.ranks)
     read = read_bundle(bundle)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
     problem = model.problem(f_max, delta_max, accuracy=settings.accuracy)
+    if wanted:
+        plan = planned(read.specimen, model.mixture, wanted)
+        problem = lattice_problem(model, plan, problem, f_max, delta_max)
     store = SimulationStore(prepare_output(folder / "simulations"))
     key = problem_key(problem, chosen.label)
     progress = progress or Silent()
@@ -65,10 +73,17 @@ def simulate(
     run_all(chosen.solve, {key: problem}, store, workers=1, progress=progress, names={key: name})
     solution = store.get(key)
     assert solution is not None
+    solution = settled(problem, solution)
     points = read.observation_points
     seen = observe_solution(problem, solution, points)
     result = {"version": __version__, "command": "simulate", "seconds": solution.seconds, "engine": settings.engine}
-    result |= {"bundle": read.name, "f_max_n": f_max, "delta_max_m": delta_max, "remarks": list(model.remarks)}
+    result |= {
+        "bundle": read.name,
+        "f_max_n": f_max,
+        "delta_max_m": delta_max,
+        "remarks": list(model.remarks),
+        "effects": wanted,
+    }
     result |= test_result(problem, solution, points, seen)
     write_arrays(folder, SIMULATE, simulation_arrays(problem, solution, points, seen))
     write_result(folder, result)

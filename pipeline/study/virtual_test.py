@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,13 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import InputError
+from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.particles import Phase
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.equilibrium.solve import solve as find_equilibria
 from pipeline.execution.progress import Progress, Silent
+from pipeline.gap.effects import checked, effect
 from pipeline.microstructure.gradation import Grading, fuller_section
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle, read_bundle
@@ -25,6 +27,7 @@ from pipeline.store.images import read_grey, read_labels
 from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
 from pipeline.store.results import plain
 from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_of
+from pipeline.study.effects import planned
 from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
@@ -57,6 +60,7 @@ class Request:
     camera_mm_per_px : float; their scale
     noise_grey : float; standard deviation of one of their pixels, in grey values of 0 to 255
     frames : int; images or fields from the beginning of the loading to the end
+    effect : (name, value) pairs; what the model leaves out
     """
 
     geometry: str | None = None
@@ -73,14 +77,33 @@ class Request:
     camera_mm_per_px: float | None = None
     noise_grey: float | None = None
     frames: int | None = None
+    effect: Sequence[tuple[str, float]] | None = None
 
     def __post_init__(self) -> None:
+        for name, value in self.effect or ():
+            checked(name, value)
+        if len({name for name, _ in self.effect or ()}) < len(self.effect or ()):
+            raise InputError("an effect is given twice: give each once, with its whole value")
+        if self.images and self.measuring:
+            raise UnavailableError(
+                f"{', '.join(self.measuring)} with --images is not in this version: make fields, without --images"
+            )
         of_images = {"--camera-mm-per-px": self.camera_mm_per_px, "--noise-grey": self.noise_grey}
         others = {"--noise-px": self.noise_px} if self.images else of_images
         given = [name for name, value in others.items() if value is not None]
         if given:
             what = "displacement fields, not to speckle images" if self.images else "speckle images: add --images"
             raise InputError(f"{' and '.join(given)} belongs to {what}")
+
+    @property
+    def effects(self) -> dict[str, float]:
+        """All effects by name."""
+        return dict(self.effect or ())
+
+    @property
+    def measuring(self) -> dict[str, float]:
+        """The measurement effects among them."""
+        return {n: v for n, v in self.effects.items() if effect(n).kind == "measurement"}
 
     @property
     def displacement_noise(self) -> float:
@@ -251,7 +274,19 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
     recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
     pitch = PITCH * bundle.model.radius
-    return break_network(bundle.specimen, phase_at, mixture(bundle), truth, recording, pitch, rng, find_equilibria)
+    nominal = mixture(bundle)
+    return break_network(
+        bundle.specimen,
+        phase_at,
+        nominal,
+        truth,
+        recording,
+        pitch,
+        rng,
+        find_equilibria,
+        plan=planned(bundle.specimen, nominal, request.effects),
+        measuring=request.measuring,
+    )
 
 
 def _truth_text(
@@ -268,6 +303,7 @@ def _truth_text(
         "network": {"pitch_mm": test.pitch / MM, "points": test.particles, "bonds": test.bonds},
         "factors": vars(test.factors),
         "noise": _noise(request),
+        "effects": request.effects,
         "sync_offset_s": clock.offset,
         "factors_check": vars(test.check),
         "energy_error": test.solution.energy.error,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +14,10 @@ from pipeline.core.observation import observe
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
+from pipeline.gap.plan import Plan
 from pipeline.materials.mixture import Mixture
 from pipeline.twin.calibration import CutCheck, calibrated_factors, check_factors
+from pipeline.twin.effects import Record, put_down, refuse_unknown, spoiled, with_effects, with_voids
 from pipeline.twin.network import irregular_network
 from pipeline.twin.problem import Factors, PhaseAt, Truth, twin_problem
 
@@ -138,6 +140,8 @@ def virtual_test(
     rng: np.random.Generator,
     solve: Solve,
     factors: Factors | None = None,
+    plan: Plan | None = None,
+    measuring: Mapping[str, float] | None = None,
 ) -> VirtualTest:
     """Make a network, break it and record it.
 
@@ -152,17 +156,26 @@ def virtual_test(
     rng : numpy Generator; network and noise come from it
     solve : engine, Problem → Solution
     factors : Factors; those of `twin.calibration` where not given
+    plan : Plan; the test as it really is, where physics effects make it another one than specimen and mixture say
+    measuring : measurement effect → value
     """
+    plan = Plan(specimen, mixture) if plan is None else plan
+    refuse_unknown(plan)
     factors = calibrated_factors() if factors is None else factors
     of_network, of_noise, of_cuts = rng.spawn(3)
-    network = irregular_network(specimen, pitch, of_network)
+    of_effects = of_network.spawn(1)[0]
+    network = irregular_network(plan.specimen, pitch, of_network)
+    phase_at = with_voids(phase_at, plan.specimen, plan.void_share, of_effects)
     stations = recording.frame_cmod[recording.frame_cmod > 0]
     problem = twin_problem(
-        specimen, network, phase_at, mixture, truth, factors, recording.cmod_max * (1 + 1e-6), stations
+        plan.specimen, network, phase_at, plan.mixture, truth, factors, recording.cmod_max * (1 + 1e-6), stations
     )
-    problem = replace(problem, cmod_rate=recording.cmod_rate)
-    solution = solve(problem)
-    curve, field = exact_record(problem, solution, recording)
+    problem = with_effects(replace(problem, cmod_rate=recording.cmod_rate), plan)
+    solution = put_down(problem, solve(problem), plan)
+    curve, field = exact_record(replace(problem, specimen=specimen), solution, recording)
+    record = Record(curve, field, specimen, of_effects.uniform(0, 2 * np.pi))
+    record = spoiled(record, measuring or {})
+    curve, field = record.curve, record.field
     noisy_curve, noisy_field = noisy_record(curve, field, recording, of_noise)
     return VirtualTest(
         curve=noisy_curve,

@@ -30,6 +30,7 @@ def sight(columns=(-9.0, -4.5, 4.5, 9.0), rows=(0.0, 1.5, 3.0, 4.5)) -> Sight:
         centre=np.array([0.0, 20e-3]),
         corner=32e-3,
         pull=np.array([0.0, -1.0]),
+        end_cmod=float(cmod[-1]),
     )
 
 

@@ -9,7 +9,7 @@ from pipeline.gap.observation import Reading, Sight
 
 
 class Magnification(MeasurementEffect):
-    """Positions grow about the centre of the view, in proportion to the CMOD, by `value` at the last station."""
+    """Positions grow about the centre of the view, in proportion to the CMOD, by `value` at the end of the test."""
 
     name = "magnification"
     says = "the picture grows during the test (out-of-plane motion)"
@@ -17,6 +17,6 @@ class Magnification(MeasurementEffect):
     remedy = "film an unloaded plate beside the specimen, or use a second camera or a telecentric lens"
 
     def distort(self, value: np.ndarray, sight: Sight, reading: Reading) -> Reading:
-        share = value[0] * sight.cmod / sight.cmod.max()
+        share = value[0] * sight.cmod / sight.end_cmod
         seen = reading.field + share[:, None, None] * (sight.points - sight.centre + reading.field)
         return Reading(seen, reading.load)

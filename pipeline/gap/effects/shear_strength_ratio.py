@@ -17,4 +17,5 @@ class ShearStrengthRatio(PhysicsEffect):
     remedy = "a mixed-mode test of the same mixture"
 
     def change(self, value: float, plan: Plan) -> Plan:
-        return replace(plan, shear_strength=value)
+        ratio = (1 + value) * plan.mixture.shear_strength_ratio
+        return replace(plan, mixture=replace(plan.mixture, shear_strength_ratio=ratio))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from pipeline.gap.effect import Magnitude, PhysicsEffect
 from pipeline.gap.plan import Plan
+from pipeline.materials.softening import Shape, Softening
 
 
 class SofteningShape(PhysicsEffect):
@@ -17,4 +18,4 @@ class SofteningShape(PhysicsEffect):
     remedy = "test farther into the tail, or measure tensile strength on its own"
 
     def change(self, value: float, plan: Plan) -> Plan:
-        return replace(plan, tail=value)
+        return replace(plan, mixture=replace(plan.mixture, softening=Softening(Shape.BILINEAR_TAIL, value)))

@@ -1,0 +1,133 @@
+"""A diagnosis by the keys of result.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline import __version__
+from pipeline.core.units import MM
+from pipeline.gap.closure import Closure, Distance
+from pipeline.gap.diagnosis import Diagnosis
+from pipeline.gap.effects import effect, library
+from pipeline.gap.fit import Fitted
+from pipeline.gap.identifiability import DETECTED
+from pipeline.gap.score import NONE
+from pipeline.store.bundle import Bundle
+from pipeline.study.diagnose_sight import Seen
+
+
+def diagnosis_result(
+    bundle: Bundle, look: Seen, diagnosis: Diagnosis, warnings: list[str], radius: float
+) -> dict[str, Any]:
+    """What result.json holds, but for the time taken and the engine."""
+    d = diagnosis
+    return {
+        "version": __version__,
+        "command": "diagnose",
+        "bundle": bundle.name,
+        "geometry": bundle.specimen.geometry,
+        "radius_mm": radius / MM,
+        "verdict": d.verdict.kind,
+        "named": list(d.verdict.named),
+        "reason": d.verdict.reason,
+        "probability": dict(sorted(d.scored.probability.items(), key=lambda item: -item[1])),
+        "log_bayes": dict(d.scored.log_bayes),
+        "temperature": d.scored.temperature,
+        "set_90": d.scored.credible(),
+        "equivalence_classes": [list(c) for c in d.card.classes],
+        "cannot_exclude": cannot_exclude(d),
+        "estimate": {n: estimate(d, n) for n in _single(d)},
+        "where": [vars(cell) for cell in d.cells],
+        "closure": {label: closure_result(c) for label, c in d.closures.items()},
+        "detection_limit": {
+            n: {"value": _finite(limit), "unit": effect(n).magnitude.unit, "d_prime_at_most": float(at_most)}
+            for n, limit, at_most in zip(d.card.names, d.card.limit, d.card.d_prime, strict=True)
+        },
+        "remaining_d_prime": {
+            n: {"value": float(v), **dict(zip(d.card.names, row.tolist(), strict=True))}
+            for n, v, row in zip(d.card.names, d.card.looked_at, d.card.remaining, strict=True)
+        },
+        "gate": {m: {"chi_square_per_dof": d.gate.ratio[m], "limit": d.gate.limit[m]} for m in d.gate.ratio},
+        "not_tested": dict(d.untested),
+        "parameters_before": _parameters(d.fits[NONE]),
+        "parameters_after": _parameters(d.best),
+        "bias_removed": _bias(d),
+        "separate_by": separate_by(d),
+        "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
+        "warnings": warnings + ([_edge()] if d.fits[NONE].at_edge else []),
+        "remarks": list(look.remarks),
+        "simulations": d.runs,
+        "data": int(d.data.target.size),
+    }
+
+
+def _edge() -> str:
+    return "the fit of the model as it is lies on the edge of the grid: an effect pulls it there, or [start] is far off"
+
+
+def _single(d: Diagnosis) -> list[str]:
+    return [n for n in d.card.names if n in d.fits]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def estimate(d: Diagnosis, name: str) -> dict[str, Any]:
+    """How large an effect is if it is the only one."""
+    fitted = d.fits[name]
+    [value], [interval] = fitted.values(), fitted.interval()
+    return {"value": float(value), "unit": effect(name).magnitude.unit, "interval_95": interval.tolist()}
+
+
+def cannot_exclude(d: Diagnosis) -> list[str]:
+    """Effects these data do not rule out: untested, too small to be seen, or still in the 90 % set."""
+    likely = {n for label in d.scored.credible() if label != NONE for n in label.split(" + ")}
+    found = {*d.untested, *d.card.hidden, *likely, *(m for n in d.verdict.named for m in d.card.class_of(n))}
+    return sorted(found - set(d.verdict.named if d.verdict.kind == "cause" else ()))
+
+
+def separate_by(d: Diagnosis) -> list[str]:
+    """What to measure next, for what is named and its rivals first, then for what cannot be seen."""
+    labels = [label for label in d.scored.credible() if label != NONE]
+    first = [n for label in labels for n in label.split(" + ")] + list(d.verdict.named)
+    return [f"{n}: {effect(n).remedy}" for n in dict.fromkeys([*first, *cannot_exclude(d)])]
+
+
+def closure_result(c: Closure) -> dict[str, Any]:
+    """One closure by its keys."""
+    return {
+        "fraction": _finite(c.fraction),
+        "interval_95": None if c.nothing else list(c.interval),
+        "nothing_to_close": c.nothing,
+        "before": _distance(c.before),
+        "after": _distance(c.after),
+        "floor": c.floor,
+        "held_out": {name: {"before": _distance(one), "after": _distance(two)} for name, (one, two) in c.folds.items()},
+    }
+
+
+def _distance(d: Distance) -> dict[str, float | None]:
+    return {"displacement_um": _finite(d.displacement_um), "load_n": _finite(d.load_n), "scaled": _finite(d.scaled)}
+
+
+def _parameters(fitted: Fitted) -> dict[str, float]:
+    return {"f_max_n": float(fitted.parameters[0]), "delta_max_m": float(fitted.parameters[1])}
+
+
+def _bias(d: Diagnosis) -> dict[str, float]:
+    """By how much the best explanation moves the parameters, relative."""
+    change = d.fits[NONE].parameters / d.best.parameters - 1
+    return {"f_max": float(change[0]), "delta_max": float(change[1])}
+
+
+def sentence(d: Diagnosis) -> str:
+    """The verdict in one line."""
+    named = ", ".join(d.verdict.named)
+    told = f"{d.verdict.kind}{': ' + named if named else ''} – {d.verdict.reason}"
+    hidden = len(d.card.hidden) + len(d.untested)
+    return (
+        f"{told}; {hidden} of {len(library())} effects could not have been seen (d′ below {DETECTED:g}, or not tested)"
+    )
