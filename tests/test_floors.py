@@ -20,10 +20,18 @@ FLOORS = {
     4: {"lmp", "reference", "equilibrium", "twin", "blind"},
     5: {"store", "config", "report", "execution", "hpc"},
     6: {"study"},
-    7: {"cli", "cli_diagnose", "cli_library", "options", "terminal", "__main__"},
+    7: {"cli", "cli_cluster", "cli_diagnose", "cli_library", "options", "terminal", "__main__"},
 }
 ROOMS = {room: floor for floor, rooms in FLOORS.items() for room in rooms}
-FACE = {"cli", "cli_diagnose", "cli_library", "options", "terminal", "__main__"}  # one room in several files
+FACE = {
+    "cli",
+    "cli_cluster",
+    "cli_diagnose",
+    "cli_library",
+    "options",
+    "terminal",
+    "__main__",
+}  # one room in several files
 BLIND = {("study", "blind_check")}  # the only ones who may know the engine of the blind check
 
 # written so that this file does not contain what it looks for

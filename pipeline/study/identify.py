@@ -179,7 +179,11 @@ def identify(
 
 
 def prepare(
-    read: Bundle, out: Path, settings: RunSettings, progress: Progress, executor: Executor | None = None
+    read: Bundle,
+    out: Path,
+    settings: RunSettings,
+    progress: Progress,
+    executor: Executor | None = None,
 ) -> tuple[Campaign, Objective, Path]:
     """Everything that an estimation needs before the first simulation: campaign, objective and folder of results."""
     chosen = engine_of(settings.engine, settings.ranks)
@@ -232,10 +236,16 @@ def from_images(model: Model, aim: Objective, folder: Path, settings: RunSetting
     return replace(model, bundle=with_measured_fields(bundle, found), remarks=(*model.remarks, *told))
 
 
+def first_grid(campaign: Campaign) -> Design:
+    """The grid around the start of the search."""
+    settings = campaign.settings
+    return Design(start_parameters(campaign.model.bundle), settings.f_factors, settings.delta_factors)
+
+
 def search(campaign: Campaign, aim: Objective) -> Estimate:
     """Estimate on the grid, then again with the mean of several placements of its lattice near the optimum."""
     settings = campaign.settings
-    start = Design(start_parameters(campaign.model.bundle), settings.f_factors, settings.delta_factors)
+    start = first_grid(campaign)
     campaign.progress.stage(f"{np.prod(start.shape)} simulations")
     found = centred(campaign, start, aim)
     if not (settings.placement_count and found.accepted):

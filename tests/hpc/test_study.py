@@ -1,0 +1,202 @@
+"""Export, run without Python, collect: the same fit as here, whatever is killed; what is damaged is named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from hpc.studies import bare_path, kill_after, load_bundle, run_point, start_point, use_the_wheel
+from pipeline.cli import app
+from pipeline.core.errors import BundleError, InputError, StoreError
+from pipeline.hpc.manifest import FILE
+from pipeline.lmp.output import read_curve
+from pipeline.study.collect import collect
+from pipeline.study.export import export
+from pipeline.study.identify import identify
+
+GRID = (0.9, 1.0, 1.1)
+SAME = 1e-8  # asked for; the same bits where both styles were compiled with the flags of CMakeLists.txt
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return load_bundle(tmp_path_factory.mktemp("test") / "bundle", "a-name-of-its-own")
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return bare_path(tmp_path_factory.mktemp("path") / "bin")
+
+
+@pytest.fixture(scope="module")
+def exported(bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of nine points that nobody has run."""
+    out = tmp_path_factory.mktemp("exported") / "study"
+    export(bundle, out, grid=GRID, restart_steps=1000)
+    use_the_wheel(out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def done(exported: Path, path: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same study, run; the last point in pieces."""
+    out = tmp_path_factory.mktemp("done") / "study"
+    shutil.copytree(exported, out)
+    for number in range(8):
+        code, told = run_point(out, number, path)
+        assert code == 0, told
+    pieces = 0
+    while kill_after(start_point(out, 8, path), 0.15 + 0.05 * pieces):
+        pieces += 1
+    code, told = run_point(out, 8, path)
+    assert (code, told) == (0, "point 0008 is done\n")
+    return out
+
+
+@pytest.fixture
+def study(done: Path, tmp_path: Path) -> Path:
+    """A copy of the run study, to be damaged."""
+    shutil.copytree(done, tmp_path / "study")
+    return tmp_path / "study"
+
+
+def test_collect_gives_what_identify_gives(study: Path, bundle: Path, tmp_path: Path) -> None:
+    identify(bundle, tmp_path / "here", grid=GRID, workers=2)
+    shutil.rmtree(bundle.parent / "gone", ignore_errors=True)
+    collect(study)
+    here, there = (json.loads((folder / "result.json").read_text()) for folder in (tmp_path / "here", study))
+    for name in ("f_max_n", "delta_max_m", "objective_min", "peak_load_n"):
+        assert there[name] == pytest.approx(here[name], rel=SAME)
+    assert there["simulations"] == here["simulations"]
+    assert "9 points were run elsewhere by LAMMPS 22 Jul 2025" in there["remarks"][-1]
+
+
+def test_a_point_killed_and_continued_is_that_of_an_uninterrupted_run(
+    exported: Path, path: str, tmp_path: Path
+) -> None:
+    curves = []
+    for name in ("whole", "pieces"):
+        out = tmp_path / name
+        shutil.copytree(exported, out)
+        killed = 0
+        while name == "pieces" and killed < 12 and kill_after(start_point(out, 0, path), 0.12 + 0.03 * killed):
+            killed += 1
+        code, told = run_point(out, 0, path)
+        assert code == 0, told
+        curves.append(read_curve(out / "points/0000/curve.txt"))
+    for column, other in zip(curves[0].values(), curves[1].values(), strict=True):
+        assert (column == other).all(), "the same bits, no row lost, none twice"
+    assert not list((out / "points/0000").glob("restart.*")), "what is done keeps no restart files"
+
+
+def test_what_is_missing_is_named_and_the_rest_is_kept(study: Path, path: str) -> None:
+    shutil.rmtree(study / "points/0001")
+    (study / "points/0004/results.sha256").unlink()
+    for name in ("results.sha256", "curve.txt", "frames.dump", "bonds.dump"):
+        (study / "points/0005" / name).unlink()
+    with pytest.raises(StoreError) as caught:
+        collect(study)
+    assert str(caught.value).splitlines() == [
+        "6 of 9 points are whole and kept; the fit needs them all",
+        "points/0001 is missing: its folder is not there; copy it back",
+        "points/0004 is not finished: it was stopped; run point 4 again",
+        "points/0005 is missing: it was never run; run point 5 again",
+    ]
+    assert len(list((study / "simulations").glob("*.h5"))) == 6
+    assert run_point(study, 4, path)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("frames.dump", "frames.dump has another checksum"),
+        ("curve.txt", "curve.txt has another checksum"),
+        ("bonds.inc", "bonds.inc has another checksum"),
+        ("inputs.sha256", "its inputs.sha256 is of another study or was changed"),
+    ],
+)
+def test_a_truncated_file_is_named(study: Path, name: str, told: str) -> None:
+    file = study / "points/0002" / name
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    with pytest.raises(StoreError, match=rf"points/0002 is damaged: {told}"):
+        collect(study)
+
+
+def test_damaged_inputs_do_not_run(exported: Path, path: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    shutil.copytree(exported, out)
+    (out / "points/0003/bonds.inc").write_text("bond_coeff 1 1 1 1\n")
+    code, told = run_point(out, 3, path)
+    assert (code, told) == (
+        1,
+        "run-point: the inputs of point 0003 are damaged or incomplete: "
+        "copy points/0003 again from where it was exported\n",
+    )
+    assert run_point(out, 9, path) == (1, f"run-point: there is no point 0009 in {out}\n")
+
+
+def test_two_studies_never_mix(study: Path, bundle: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    export(bundle, other, grid=(0.8, 1.0, 1.2), restart_steps=1000)
+    with pytest.raises(InputError, match="holds another study"):
+        export(bundle, study, grid=(0.8, 1.0, 1.2), restart_steps=1000)
+    for name in ("curve.txt", "frames.dump", "bonds.dump", "results.sha256"):
+        shutil.copy(study / "points/0003" / name, other / "points/0003" / name)
+    shutil.copytree(study / "points/0004", other / "points/0004", dirs_exist_ok=True)
+    with pytest.raises(StoreError) as caught:
+        collect(other)
+    assert "points/0003 is damaged: its results were made from other inputs" in str(caught.value)
+    assert "points/0004 is damaged: its inputs.sha256 is of another study" in str(caught.value)
+
+
+def test_a_changed_manifest_bundle_or_folder_is_refused(study: Path, bundle: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds other files"):
+        export(bundle, bundle.parent)
+    text = (study / FILE).read_text()
+    (study / FILE).write_text(text.replace('"number": 1', '"number": 2', 1))
+    result = CliRunner().invoke(app, ["collect", str(study)])
+    assert result.exit_code == 1
+    assert "manifest.json was changed after it was written" in result.stderr
+    (study / FILE).write_text(text)
+    (study / "bundle/load_cmod.csv").write_text("time_s,cmod_mm,load_n\n")
+    with pytest.raises(StoreError, match=r"bundle/load_cmod\.csv has another checksum"):
+        collect(study)
+    result = CliRunner().invoke(app, ["collect", str(tmp_path)])
+    assert result.exit_code == 1
+    assert "is no exported study" in result.stderr
+
+
+def test_an_export_again_changes_nothing(exported: Path, bundle: Path) -> None:
+    before = {str(file): file.read_bytes() for file in exported.rglob("*") if file.is_file()}
+    export(bundle, exported, grid=GRID, restart_steps=1000)
+    assert {str(file): file.read_bytes() for file in exported.rglob("*") if file.is_file()} == before
+
+
+EVIL = "a$(touch pwned)`touch pwned`;touch pwned\\n#SBATCH --wrap=x\\nshell touch pwned"
+
+
+def test_names_of_a_bundle_reach_no_script(exported: Path, bundle: Path, tmp_path: Path) -> None:
+    evil = tmp_path / "evil"
+    shutil.copytree(bundle, evil)
+    text = (evil / "experiment.toml").read_text()
+    assert '"a-name-of-its-own"' in text
+    (evil / "experiment.toml").write_text(text.replace('"a-name-of-its-own"', f'"{EVIL}"', 1))
+    with pytest.raises(BundleError, match=r"name = .* may hold letters, digits, dot, dash and underscore only"):
+        export(evil, tmp_path / "study", grid=GRID)
+    assert not (tmp_path / "study").exists()
+    scripts = [exported / name for name in ("run-point", "environment", "submit.slurm")]
+    for file in [*scripts, *(exported / "points").rglob("*.*")]:
+        assert b"a-name-of-its-own" not in file.read_bytes(), "nor does a name that is accepted"
+
+
+@pytest.mark.parametrize("option", ["--partition", "--account"])
+@pytest.mark.parametrize("name", ["a b", "x\n#SBATCH --wrap=y", "$(reboot)", "-p", "a;b", ""])
+def test_names_of_slurm_are_names(bundle: Path, tmp_path: Path, option: str, name: str) -> None:
+    result = CliRunner().invoke(app, ["export", str(bundle), str(tmp_path / "s"), option, name])
+    assert result.exit_code == 1
+    assert f"slurm_{option[2:]} = {name!r}" in result.stderr
+    assert not (tmp_path / "s").exists()
