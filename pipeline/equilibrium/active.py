@@ -8,7 +8,6 @@ from pipeline.core.problem import Kinematics, Problem
 from pipeline.materials.cohesive import LinearSoftening
 
 STRIP = 0.2  # half width of the strip over the ligament; also how far it begins behind the tip
-LIKELY = 0.95  # of δ_peak: when further bonds must become active, far ones opened beyond this do too
 LARGEST = 0.5  # share of active bonds from which condensing does not pay
 FEWEST = 2000  # particles below which it does not pay either
 

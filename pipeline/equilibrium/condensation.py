@@ -8,15 +8,17 @@ the far bonds are looked at: one that would have been damaged becomes active, as
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from pipeline.equilibrium.assembly import Assembly, assembly
+from pipeline.equilibrium.factor import factorise
 from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
-from pipeline.equilibrium.potential import factorise
 from pipeline.materials.cohesive import LinearSoftening
 
 BATCH = 64  # right-hand sides at a time
@@ -32,12 +34,15 @@ class CondensedNetwork:
     edge : (b,) int array; kept variables that the support acts on
     support : (b + 1, b + 1) array, N/m, over these and the machine displacement
     islands : Islands
+    assembly : Assembly of the strip's bonds and the support
     """
 
     bonds: SmallNetwork
     edge: np.ndarray
     support: np.ndarray
     islands: Islands
+    assembly: Assembly
+    ordered: ClassVar[bool] = True
 
     @property
     def kept(self) -> int:
@@ -60,10 +65,9 @@ class CondensedNetwork:
         strip, islands = self.bonds.drive.size, self.islands
         soft = weight[strip:] - islands.k_n
         row = islands.row[:, :-1]
-        inner = self.bonds.stiffness(weight[:strip], free[: self.kept], machine)
-        inner = inner + _spread(self.support[:-1, :-1] + row.T @ (soft[:, None] * row), self.edge, self.kept)
+        inner = self.assembly.stiffness(weight[:strip], self.support[:-1, :-1] + row.T @ (soft[:, None] * row))
         if not islands.count:
-            return inner.tocsc()
+            return inner
         apart = sparse.csc_array(islands.inverse + np.diag(soft))
         return sparse.block_diag([inner, apart], format="csc")
 
@@ -155,10 +159,10 @@ class CondensedModel:
         reached[self.bonds] = state.reached
         return replace(state, free=free, opening=opening, reached=reached)
 
-    def weak(self, state: State, share: float) -> np.ndarray:
-        """Far bonds (m,) bool that a state of this model opens beyond `share` of their δ_peak."""
+    def usage(self, state: State) -> np.ndarray:
+        """Opening of every far bond (m,) as a share of its δ_peak in a state of this model; 0 for active bonds."""
         opening = self.whole.network.opening(self.complete(state.free, state.machine), state.machine)
-        return ~self.active & (opening > share * self.whole.law.delta_peak)
+        return np.where(self.active, 0.0, opening / self.whole.law.delta_peak)
 
     def grown(self, more: np.ndarray) -> CondensedModel:
         """The model with further bonds (m,) bool as islands, by one solution of the far field each."""
@@ -185,6 +189,7 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     rigid = network.part(~active, np.arange(whole.gauge.size))
     stiffness = rigid.stiffness(law.k_n[~active], whole.gauge, 0.0).tocsr()
     pull, load = rigid.pull(law.k_n[~active] * rigid.drive, whole.gauge, 0.0)
+    kept = kept[_order(network, active, kept, stiffness)]
     inside = stiffness[inner][:, inner].tocsc()
     far = FarField(inner, factorise(inside), stiffness[inner][:, kept].tocsr(), pull[inner])
     edge = np.flatnonzero(np.diff(stiffness[kept].indptr))
@@ -192,11 +197,13 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     outer = sparse.block_array([[stiffness[held][:, held], pull[held, None]], [pull[None, held], [[load]]]]).tocsc()
     across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsc()
     support = schur_complement(inside, across, outer, far.factor)
+    bonds = network.part(active, kept)
+    islands = no_islands(edge.size, inner.size)
     return CondensedModel(
         whole=whole,
         strip=active,
         kept=kept,
-        network=CondensedNetwork(network.part(active, kept), edge, support, no_islands(edge.size, inner.size)),
+        network=CondensedNetwork(bonds, edge, support, islands, assembly(bonds.jacobian, edge)),
         law=law.of(active),
         gauge=whole.gauge[kept],
         gauge_drive=whole.gauge_drive,
@@ -248,7 +255,14 @@ def schur_complement(
     return 0.5 * (schur + schur.T)
 
 
-def _spread(support: np.ndarray, edge: np.ndarray, size: int) -> sparse.csc_array:
-    """A stiffness (b, b) of the edge among the kept variables, as a sparse array (size, size)."""
-    row, column = np.repeat(edge, edge.size), np.tile(edge, edge.size)
-    return sparse.coo_array((support.ravel(), (row, column)), shape=(size, size)).tocsc()
+def _order(network: SmallNetwork, active: np.ndarray, kept: np.ndarray, far: sparse.csr_array) -> np.ndarray:
+    """A good order of elimination (q,) of the kept variables, those on the edge being all coupled.
+
+    `far` (all, all) is the stiffness of the other bonds.
+    """
+    edge = np.flatnonzero(np.diff(far[kept].indptr))
+    bonds = network.part(active, kept)
+    frame = assembly(bonds.jacobian, edge)
+    stiff = abs(bonds.jacobian).max() * active.size  # diagonally dominant: only its pattern counts
+    matrix = frame.stiffness(np.ones(bonds.drive.size), stiff * np.eye(edge.size) + 1e-9)
+    return np.argsort(factorise(matrix + stiff * sparse.eye_array(kept.size, format="csc")).perm_c)

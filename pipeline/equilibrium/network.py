@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy import sparse
@@ -27,6 +27,11 @@ class Network(Protocol):
         """Stiffness (q, q), N/m, of bonds with stiffness `weight` (m,), N/m."""
         ...
 
+    @property
+    def ordered(self) -> bool:
+        """Whether the variables stand in a good order of elimination."""
+        ...
+
     def energy(self, free: np.ndarray, machine: float) -> float:
         """Elastic energy, J, of what is condensed into the network; 0 where nothing is."""
         ...
@@ -45,6 +50,7 @@ class SmallNetwork:
     jacobian: sparse.csr_array
     transpose: sparse.csr_array
     drive: np.ndarray
+    ordered: ClassVar[bool] = False
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         return self.jacobian @ free + machine * self.drive
@@ -78,6 +84,7 @@ class FiniteNetwork:
     arm: np.ndarray
     pairs: np.ndarray
     constraints: Constraints
+    ordered: ClassVar[bool] = False
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         relative = self._relative(free, machine)

@@ -51,14 +51,19 @@ class Path:
     last : float, m; CMOD at which the path ends
     stations : (k,) array, m; CMOD values at which increments should end
     increments : Increments
+    snap_back : bool; False: the machine only moves forward, and the crack jumps where it should move back
+    jumps : int; how often the crack jumped
+    released : float, J; energy that was set free thereby, which a slow explicit run gives to its damping
     """
 
     stepper: Stepper
     last: float
     stations: np.ndarray
     increments: Increments
+    snap_back: bool = True
     gauge_controlled: bool = False
     jumps: int = 0
+    released: float = 0.0
     peak: float = field(default=0.0)
     _stiff: float = field(default=1.0)  # machine displacement a CMOD while elastic
 
@@ -95,7 +100,7 @@ class Path:
             if found is not None and self._smooth(state, found):
                 return found
             rough = rough or found
-            self.gauge_controlled = self.gauge_controlled or halving >= 1
+            self.gauge_controlled = self.snap_back and (self.gauge_controlled or halving >= 1)
         if rough is None:
             rough = self._machine(before, state, wanted, np.inf)
         if rough is None:
@@ -104,20 +109,20 @@ class Path:
                 "allow more iterations, smaller increments or a larger tolerance"
             )
         self.jumps += 1
+        self.released += _lost(state, rough)
         return rough
 
     def _smooth(self, state: State, found: State) -> bool:
         """Whether the load changed little and no energy was set free, as it is when a crack jumps."""
-        work = 0.5 * (state.load + found.load) * (found.machine - state.machine)
-        lost = work - (found.energy - state.energy)
         little = self.increments.leap * self.peak
-        return abs(found.load - state.load) <= little and abs(lost) <= 0.02 * little * abs(found.cmod - state.cmod)
+        lost = abs(_lost(state, found))
+        return abs(found.load - state.load) <= little and lost <= 0.02 * little * abs(found.cmod - state.cmod)
 
     def _choose_control(self, before: State, state: State) -> None:
         """Leave machine control where machine displacement hardly grows with CMOD; go back where it does again."""
         opened = state.cmod - before.cmod
         gain = (state.machine - before.machine) / (opened * self._stiff) if opened > 0 else 0.0
-        self.gauge_controlled = gain < (0.1 if self.gauge_controlled else 0.02)
+        self.gauge_controlled = self.snap_back and gain < (0.1 if self.gauge_controlled else 0.02)
 
     def _attempt(self, before: State, state: State, wanted: float) -> State | None:
         if not self.gauge_controlled:
@@ -137,3 +142,9 @@ class Path:
         found = self.stepper.by_machine(state, guess, machine)
         opened = found is not None and 0 < found.cmod - state.cmod <= allowed
         return found if opened else None
+
+
+def _lost(state: State, found: State) -> float:
+    """Work of the machine (J) between two states that is neither stored nor used up."""
+    work = 0.5 * (state.load + found.load) * (found.machine - state.machine)
+    return work - (found.energy - state.energy)

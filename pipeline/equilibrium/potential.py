@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import SuperLU
 
-from pipeline.core.errors import InputError
 from pipeline.core.problem import CohesiveLaw
+from pipeline.equilibrium.factor import factorise_roughly
 from pipeline.equilibrium.network import Network
 
 SOFTENING_SHARE = 0.2  # of the secant stiffness of softening bonds; 1 needs a fifth more iterations, 0.03 no fewer
@@ -62,32 +62,6 @@ class Potential:
         return self.network.stiffness(np.maximum(weight, FLOOR * self.law.k_n), free, machine)
 
 
-def factorise(stiffness: sparse.csc_array) -> SuperLU:
-    """Symmetric factorisation without pivoting, for positive definite matrices."""
-    return splu(stiffness, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def factorise_elastic(stiffness: sparse.csc_array) -> SuperLU:
-    """The factorised elastic stiffness.
-
-    Raises
-    ------
-    InputError
-        if it is singular: grips that leave a rigid motion, or particles without bonds
-    """
-    try:
-        factor = factorise(stiffness)
-        pivots = np.abs(factor.U.diagonal())
-    except RuntimeError:
-        pivots = np.zeros(1)
-    if not pivots.min() > 1e-13 * pivots.max():
-        raise InputError(
-            "the elastic stiffness of the specimen is singular: the grips must stop every rigid motion and every "
-            "particle needs at least two bonds that are not in line"
-        )
-    return factor
-
-
 @dataclass
 class SecantPreconditioner:
     """The factorised secant stiffness, renewed where the minimiser asks for it."""
@@ -103,9 +77,10 @@ class SecantPreconditioner:
     def renew(self, at: np.ndarray) -> None:
         """Factorise the secant stiffness at this state (q,)."""
         assert self.potential is not None, "move() comes first"
-        self.factor = factorise(self.potential.metric(at, self.machine))
+        metric = self.potential.metric(at, self.machine)
+        self.factor = factorise_roughly(metric, self.potential.network.ordered)
 
     def solve(self, gradient: np.ndarray) -> np.ndarray:
         """The step (q,), m, that the factorised stiffness gives under forces (q,), N."""
         assert self.factor is not None, "renew() comes first"
-        return self.factor.solve(gradient)
+        return self.factor.solve(gradient.astype(np.float32)).astype(float)

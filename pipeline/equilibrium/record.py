@@ -55,17 +55,21 @@ class Record:
         time = np.maximum.accumulate(cmod) / self.problem.cmod_rate
         return LoadCurve(time=time, cmod=cmod, load=load, load_line=machine)
 
-    def energy(self, state: State) -> EnergyBalance:
-        """Work of the machine by trapezoids against what is stored and used up in the last state."""
+    def energy(self, state: State, released: float) -> EnergyBalance:
+        """Work of the machine by trapezoids against what is stored and used up in the last state.
+
+        What was set free where the crack jumped, `released` (J), is counted as taken out by damping.
+        """
         machine, _, load = np.asarray(self.rows).T
         law = central_law(self.problem.law, "equilibrium")
         return EnergyBalance(
             external=float(np.trapezoid(load, machine)),
             stored=float(law.stored(state.opening, state.reached).sum()),
             dissipated=float(law.dissipated(state.reached).sum()),
+            damping=released,
         )
 
-    def solution(self, state: State, seconds: float, converged: bool, message: str) -> Solution:
+    def solution(self, state: State, released: float, seconds: float, converged: bool, message: str) -> Solution:
         """Everything together, at the end of the path."""
         n = self.problem.particles.count
         return Solution(
@@ -73,7 +77,7 @@ class Record:
             cmod=self.problem.stations[: len(self.frames)],
             displacement=np.array(self.frames).reshape(-1, n, 2),
             reached=state.reached,
-            energy=self.energy(state),
+            energy=self.energy(state, released),
             quasi_static_error=self.error,
             steps=len(self.rows) - 1,
             seconds=seconds,

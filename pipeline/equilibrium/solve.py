@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from pipeline.equilibrium.model import State, WholeModel, whole_model
 from pipeline.equilibrium.path import Increments, Path
 from pipeline.equilibrium.record import Record
 from pipeline.equilibrium.step import Stepper
+from pipeline.equilibrium.watch import Watch
 
 TOLERANCE = 2e-4  # five times larger, and a crack may stay on a path that is no minimum any more
 
@@ -28,6 +30,7 @@ def solve(
     increments: Increments | None = None,
     limit: int = 400,
     condensed: bool = True,
+    snap_back: bool = True,
     strict: bool = True,
     progress: Progress | None = None,
 ) -> Solution:
@@ -43,6 +46,7 @@ def solve(
     increments : Increments; how far one increment opens the mouth
     limit : int; iterations after which an increment counts as failed and is halved
     condensed : bool; eliminate what stays elastic (exact, and checked), under small kinematics
+    snap_back : bool; False: the machine only moves forward, as in the explicit engines
     strict : bool; False: a path that ends early is returned, not raised, with `converged` False
     progress : called with the share of the CMOD range that is done
 
@@ -53,7 +57,7 @@ def solve(
     """
     started = time.process_time()
     _refuse(problem, tolerance)
-    journey = _Journey(problem, tolerance, increments or Increments(), limit, condensed)
+    journey = _Journey(problem, tolerance, increments or Increments(), limit, condensed, snap_back)
     failure = None
     try:
         while not journey.path.done(journey.state):
@@ -66,35 +70,75 @@ def solve(
         failure = str(stopped)
     message = failure or journey.message()
     seconds = time.process_time() - started
-    return journey.record.solution(journey.whole_state(), seconds, failure is None, message)
+    return journey.record.solution(journey.whole_state(), journey.path.released, seconds, failure is None, message)
 
 
 class _Journey:
     """A path, the model it is followed on, which may grow on the way, and what is recorded."""
 
-    def __init__(self, problem: Problem, tolerance: float, increments: Increments, limit: int, condensed: bool):
+    def __init__(
+        self,
+        problem: Problem,
+        tolerance: float,
+        increments: Increments,
+        limit: int,
+        condensed: bool,
+        snap_back: bool,
+    ):
         self.whole = whole_model(problem)
         elastic = Stepper(self.whole).elastic()
         self.record = Record(problem)
         self.model: WholeModel | CondensedModel = self.whole
         stepper = Stepper(self.whole, limit=limit)
-        self.path = Path(stepper, problem.cmod_max, problem.stations, increments)
+        self.path = Path(stepper, problem.cmod_max, problem.stations, increments, snap_back)
         self.before, self.state = self.path.begin(elastic)
         stepper.tolerance = tolerance * _reference_force(problem, self.state.opening)
         for state, before in ((self.before, None), (self.state, self.before)):
             self.record.add(state, before, self.fields)
+        self.watch, self.looked = Watch(), 1
+        self.ahead: list[State] = []
+        self.safe = (self.before, self.state, self.path)
         chosen = active.strip(problem)
         if condensed and active.pays(problem, chosen):
             self._adopt(condense(self.whole, chosen))
 
     def step(self) -> None:
-        """One increment; repeated with a larger model where a bond outside it would have been damaged."""
+        """One increment; if it is time, a look at the far bonds, which may take increments back."""
+        if not self.ahead:
+            self.safe = (self.before, self.state, replace(self.path))
         found = self.path.next(self.before, self.state)
-        if isinstance(self.model, CondensedModel) and self.model.weak(found, 1.0).any():
-            self._adopt(self.model.grown(self.model.weak(found, active.LIKELY)))
-            return
-        self.record.add(found, self.state, self.fields)
+        self.ahead.append(found)
         self.before, self.state = self.state, found
+        if isinstance(self.model, CondensedModel):
+            if len(self.ahead) < self.watch.interval and not self.path.done(found):
+                return
+            usage = self.model.usage(found)
+            damaged = self.watch.damaged(usage)
+            if damaged.any():
+                self._take_back(self.model.grown(damaged))
+                return
+            self._keep()
+            soon = self.watch.expected(usage, self.looked)
+            if soon.any():
+                self._adopt(self.model.grown(soon))
+        else:
+            self._keep()
+
+    def _keep(self) -> None:
+        """The increments since the last look are good."""
+        before = self.safe[1]
+        for found in self.ahead:
+            self.record.add(found, before, self.fields)
+            before = found
+        self.looked = len(self.ahead)
+        self.ahead = []
+
+    def _take_back(self, model: CondensedModel) -> None:
+        """Do the increments since the last look again with a larger model."""
+        self.before, self.state, self.path = self.safe
+        self.ahead = []
+        self.watch.restart()
+        self._adopt(model)
 
     def fields(self, state: State) -> np.ndarray:
         """Displacements (n, 2), m, of all particles in a state of the model in use."""
@@ -108,7 +152,8 @@ class _Journey:
     def message(self) -> str:
         """One sentence on how the run ended."""
         jumps = self.path.jumps
-        leaps = f"; the crack jumped {jumps} times, energy was set free" if jumps else ""
+        times = "once" if jumps == 1 else f"{jumps} times"
+        leaps = f"; the crack jumped {times}, {self.path.released * 1e3:.3g} mJ were set free" if jumps else ""
         return f"equilibrium followed to CMOD = {self.state.cmod * 1e3:.4g} mm{leaps}"
 
     def _expanded(self, state: State) -> State:

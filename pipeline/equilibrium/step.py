@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.equilibrium.factor import factorise_elastic
 from pipeline.equilibrium.minimise import Minimum, minimise
 from pipeline.equilibrium.model import Model, State
-from pipeline.equilibrium.potential import Potential, SecantPreconditioner, factorise_elastic
+from pipeline.equilibrium.potential import Potential, SecantPreconditioner
 
 
 @dataclass

@@ -13,8 +13,8 @@ from pipeline.core.problem import Problem
 from pipeline.core.units import MM
 from pipeline.equilibrium import active
 from pipeline.equilibrium.condensation import CondensedModel, condense, schur_complement
+from pipeline.equilibrium.factor import factorise
 from pipeline.equilibrium.model import whole_model
-from pipeline.equilibrium.potential import factorise
 from pipeline.equilibrium.solve import solve
 from pipeline.equilibrium.step import Stepper
 
