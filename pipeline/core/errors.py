@@ -38,3 +38,7 @@ class UnavailableError(PipelineError, NotImplementedError):
 
 class ToolchainError(PipelineError, RuntimeError):
     """A compiler, a library or a compiled part is missing or does not fit."""
+
+
+class ProcessLostError(PipelineError, RuntimeError):
+    """A process was killed before it had finished its work, through no fault of the work."""

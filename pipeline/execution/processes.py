@@ -27,7 +27,7 @@ from typing import Any, ParamSpec, TypeVar
 from pebble import ProcessExpired, concurrent
 from threadpoolctl import threadpool_limits
 
-from pipeline.core.errors import InputError, PipelineError, StoreError
+from pipeline.core.errors import InputError, ProcessLostError, StoreError
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -35,7 +35,7 @@ T = TypeVar("T")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class WorkerLostError(PipelineError, RuntimeError):
+class WorkerLostError(ProcessLostError):
     """The process of a simulation ended without a result."""
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from typing import Protocol
 
-from pipeline.core.errors import PipelineError
+from pipeline.core.errors import PipelineError, ProcessLostError
 from pipeline.core.problem import Problem, Solution
-from pipeline.execution.processes import LocalProcesses, WorkerLostError, interrupts_ignored
+from pipeline.execution.processes import LocalProcesses, interrupts_ignored
 from pipeline.execution.progress import Progress, Silent
 
 Simulate = Callable[[Problem], Solution]
@@ -151,7 +151,7 @@ class _Batch:
         if error is None:
             self.store.put(key, future.result())
             self.progress.done(self._name(key))
-        elif isinstance(error, WorkerLostError | BrokenExecutor) and key not in self.retried:
+        elif isinstance(error, ProcessLostError | BrokenExecutor) and key not in self.retried:
             self.retried.add(key)
             self.progress.lost(self._name(key), error)
             self._submit(key)

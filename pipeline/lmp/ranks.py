@@ -11,7 +11,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from pipeline.core.errors import InputError, PipelineError, ToolchainError
+from pipeline.core.errors import InputError, PipelineError, ProcessLostError, ToolchainError
 from pipeline.core.problem import Problem, Solution
 from pipeline.lmp import plugin
 from pipeline.lmp.deck import DECK, write_deck
@@ -52,6 +52,8 @@ def solve_on_ranks(problem: Problem, ranks: int, folder: Path | None = None) -> 
     ------
     InputError
         for fewer ranks than one
+    ProcessLostError
+        where a rank or the launcher was killed
     ConvergenceError, StoreError, ToolchainError, PipelineError
         as `simulate.solve`
     """
@@ -79,6 +81,10 @@ def run(folder: Path, ranks: int, *more: str) -> None:
         check=False,
         preexec_fn=_end_with_parent,
     )
+    killed = re.search(r"\(signal (\d+)\)", done.stdout + done.stderr)
+    if killed or done.returncode < 0:
+        number = killed[1] if killed else -done.returncode
+        raise ProcessLostError(f"LAMMPS was killed by signal {number} in {folder}")
     if done.returncode:
         raise PipelineError(f"LAMMPS on {ranks} ranks stopped in {folder}: {_reason(folder, done)}")
 
