@@ -188,6 +188,7 @@ def _bootstrap(
     squares = [np.bincount(block, (np.where(known, v, 0.0) ** 2).sum(axis=0), count) for v in (before, after)]
     size = np.bincount(block, known.sum(axis=0), count)
     drawn = rng.multinomial(count, np.full(count, 1 / count), DRAWS)
+    drawn = drawn[drawn @ size > 0]
     total = drawn @ size
     g0, g1 = (np.sqrt(drawn @ q / total) for q in squares)
     rooms = np.maximum(g0 - floor, 1e-12)

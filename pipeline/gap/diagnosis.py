@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.candidate import Candidate
 from pipeline.gap.closure import Closure, closure, folds, held_out
 from pipeline.gap.effect import MeasurementEffect
 from pipeline.gap.effects import effect, library
@@ -27,7 +26,7 @@ from pipeline.inverse.design import Design
 from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance
 
 FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, for effects pull parameters away
-MOVES = 2  # how often the grid follows the fit of the model as it is, which an effect may pull far away
+MOVES = 3  # how often the grid follows the best of the explanations that need no simulation
 LIKELY = 0.05  # probability from which a physics effect is simulated again at its best point
 CONFIRMED = 3  # at most so many
 CLOSED = 3  # best explanations whose closure is looked at
@@ -65,7 +64,7 @@ class Diagnosis:
     closures : label → Closure, of the best explanations
     verdict : Verdict
     untested : effect → why it could not be judged
-    runs : int; simulations asked for
+    runs : int; different simulations asked for
     """
 
     observation: Observation
@@ -88,13 +87,14 @@ class Diagnosis:
 
 
 class _Counted:
-    """Simulations, counted."""
+    """Simulations, each counted once."""
 
     def __init__(self, simulate: Simulate) -> None:
-        self.simulate, self.count = simulate, 0
+        self.simulate = simulate
+        self.asked: set[Run] = set()
 
     def __call__(self, runs: Sequence[Run]) -> list[Outcome]:
-        self.count += len(runs)
+        self.asked.update(runs)
         return self.simulate(runs)
 
 
@@ -127,20 +127,18 @@ def diagnose(
         where the baseline cannot be simulated, or the best explanation lies on the edge of the grid
     """
     counted = _Counted(simulate)
-    emulator = baseline(observation, abscissae, counted, Design(start, factors, factors), entry)
-    none = fit(*_none(observation, emulator, entry))
-    emulator, untested = with_signatures(emulator, counted, none.parameters, names)
-    known = [n for n in sorted(names or library()) if n not in untested]
-    observation, data = weighed(observation, emulator, entry)
-    look = _Look(observation, data, known, entry.temperature, none.parameters)
+    wanted = sorted(library() if names is None else names)
+    emulator, near = baseline(observation, abscissae, counted, Design(start, factors, factors), entry, wanted)
+    emulator, untested = with_signatures(emulator, counted, near.parameters, wanted)
+    known = [n for n in wanted if n not in untested]
+    look = _Look(*weighed(observation, emulator, entry), known, entry.temperature)
     fits, scored = look.judge(emulator)
     emulator = confirmed(emulator, counted, fits, scored)
     observation, data = weighed(observation, emulator, entry)
-    look = replace(look, observation=observation, data=data)
-    fits, scored = look.judge(emulator)
+    fits, scored = replace(look, observation=observation, data=data).judge(emulator)
     singles = {n: emulator.candidate([n], observation.mask) for n in known}
-    table = card(singles, data, fits[NONE].parameters, entry.temperature)
     best = fits[scored.ranked()[0]]
+    table = card(singles, data, best.parameters, entry.temperature)
     if best.at_edge:
         raise ConvergenceError(
             f"the best explanation, {best.candidate.label}, lies on the edge of the grid at f_max = "
@@ -162,14 +160,28 @@ def diagnose(
         closures=closures(observation, data, fits, scored, rng),
         verdict=verdict(scored, table, judged),
         untested=untested,
-        runs=counted.count,
+        runs=len(counted.asked),
     )
 
 
 def baseline(
-    observation: Observation, abscissae: Abscissae, simulate: Simulate, design: Design, entry: Entry
-) -> Emulator:
-    """Simulate the grid; move it while the fit of the model as it is lies outside its inner cells."""
+    observation: Observation,
+    abscissae: Abscissae,
+    simulate: Simulate,
+    design: Design,
+    entry: Entry,
+    names: Sequence[str] = (),
+) -> tuple[Emulator, Fitted]:
+    """Simulate the grid; move it while the best explanation lies outside the middle of its outer cells.
+
+    Explanations are the model as it is and the effects of the measurement among `names`, which cost no simulation: a
+    gauge that reads too much pulls the parameters of the model as it is far from where they are.
+
+    Returns
+    -------
+    the emulator, and the best explanation
+    """
+    measuring = [n for n in sorted(names) if isinstance(effect(n), MeasurementEffect)]
     for _ in range(MOVES + 1):
         outcomes = simulate([Run(f, d) for f, d in design.nodes()])
         missing = [o for o in outcomes if isinstance(o, str)]
@@ -177,18 +189,15 @@ def baseline(
             raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {missing[0]}")
         values = np.reshape([o.flat() for o in outcomes if not isinstance(o, str)], (*design.shape, -1))
         emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values)
-        found = fit(*_none(observation, emulator, entry)).parameters
-        steps = [int(x > high) - int(x < low) for x, (low, high) in zip(found, emulator.inner, strict=True)]
+        look = _Look(*weighed(observation, emulator, entry), measuring, entry.temperature)
+        fits, scored = look.judge(emulator, with_pairs=False)
+        best = fits[scored.ranked()[0]]
+        steps = [int(x > high) - int(x < low) for x, (low, high) in zip(best.parameters, emulator.inner, strict=True)]
         moved = design.moved(*steps)
         if moved == design:
             break
         design = moved
-    return emulator
-
-
-def _none(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Candidate, Data]:
-    part, data = weighed(observation, emulator, entry)
-    return emulator.candidate([], part.mask), data
+    return emulator, best
 
 
 def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Observation, Data]:
@@ -211,10 +220,10 @@ def scatter(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
 
 
 def with_signatures(
-    emulator: Emulator, simulate: Simulate, parameters: np.ndarray, names: Sequence[str] | None
+    emulator: Emulator, simulate: Simulate, parameters: np.ndarray, names: Sequence[str]
 ) -> tuple[Emulator, dict[str, str]]:
     """Simulate every physics effect at two values; those that cannot be simulated are returned with the reason."""
-    wanted = [n for n in sorted(names or library()) if not isinstance(effect(n), MeasurementEffect)]
+    wanted = [n for n in names if not isinstance(effect(n), MeasurementEffect)]
     at = (float(parameters[0]), float(parameters[1]))
     runs = [Run(*at)] + [Run(*at, ((n, v),)) for n in wanted for v in effect(n).magnitude.trials]
     reference, *others = simulate(runs)
@@ -241,20 +250,19 @@ class _Look:
     data: Data
     names: list[str]
     temperature: float
-    parameters: np.ndarray
 
-    def judge(self, emulator: Emulator) -> tuple[dict[str, Fitted], Scored]:
+    def judge(self, emulator: Emulator, with_pairs: bool = True) -> tuple[dict[str, Fitted], Scored]:
         """Fit none, every effect and the pairs of the best; score them."""
         fits = {NONE: self._fit(emulator, ())}
         for name in self.names:
             fits[name] = self._fit(emulator, (name,))
-        for pair in pairs(self._score(fits)):
+        for pair in pairs(self._score(fits)) if with_pairs else ():
             found = self._fit(emulator, pair)
             fits[found.candidate.label] = found
         return fits, self._score(fits)
 
     def _fit(self, emulator: Emulator, names: tuple[str, ...]) -> Fitted:
-        return fit(emulator.candidate(names, self.observation.mask), self.data, self.parameters)
+        return fit(emulator.candidate(names, self.observation.mask), self.data)
 
     def _score(self, fits: Mapping[str, Fitted]) -> Scored:
         evidence = {label: f.log_evidence for label, f in fits.items()}
@@ -287,6 +295,8 @@ def closures(
 ) -> dict[str, Closure]:
     """Closure of the best explanations, the runner-up's beside the first's."""
     within, across = folds(observation)
+    if not within:
+        return {}
     none = held_out(fits[NONE].candidate, data, within + across, fits[NONE].parameters)
     found = {}
     for label in [label for label in scored.ranked() if label != NONE][:CLOSED]:

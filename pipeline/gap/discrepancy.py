@@ -94,8 +94,13 @@ class Remnant:
     observation: Observation
     load_scale: float
 
-    def waves(self) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (k, s) of `ALL` and the variance that noise alone gives them (k, s); NaN where unknown."""
+    def waves(self, remainder: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (k, s) of `ALL`, and the variance (k, s) that noise and remainder give them; NaN where unknown.
+
+        Parameters
+        ----------
+        remainder : (1, 3) array, m; standard deviation in the stages, none where not given
+        """
         o = self.observation
         s, p = o.sight.cmod.size, len(o.sight.points)
         use = o.mask[: 2 * s * p : 2].reshape(s, p)
@@ -104,13 +109,17 @@ class Remnant:
         noise = np.repeat(np.where(use, o.field_std, 0.0) ** 2, 2, axis=1)
         wave = np.einsum("ska,sa->ks", take, field)
         hiss = np.einsum("ska,sa->ks", take**2, noise)
+        if remainder is not None:
+            local = along_cmod(remainder[0], o.sight.progress) ** 2
+            flank = np.kron(flank_correlation(o.sight, SPREAD), np.eye(2))
+            hiss += local * np.einsum("ska,ab,skb->ks", take, flank, take, optimize=True)
         wave[:, use.sum(axis=1) < 6] = np.nan  # fewer points do not tell the modes apart
         return np.vstack([wave, o.reading.load / self.load_scale]), np.vstack(
             [hiss, (o.load_std / self.load_scale) ** 2]
         )
 
     def local(self) -> tuple[np.ndarray, np.ndarray]:
-        """Variance (s,), m², of a remainder that would leave as much beside the modes, and what of it noise leaves."""
+        """Size (1, s), m, of a remainder that leaves as much beside the modes; variance (1, s) of that by noise."""
         o = self.observation
         s, p = o.sight.cmod.size, len(o.sight.points)
         use = o.mask[: 2 * s * p : 2].reshape(s, p)
@@ -124,7 +133,7 @@ class Remnant:
             hiss = np.repeat(o.field_std[station], 2)[seen] ** 2
             square[station] = np.sum((beside @ o.reading.field[station].ravel()[seen]) ** 2) / share
             noise[station] = np.sum(beside**2 @ hiss) / share
-        return square, noise
+        return np.sqrt(square)[None], noise[None]
 
 
 def learn(remnants: list[Remnant]) -> Discrepancy:
@@ -144,19 +153,27 @@ def learn(remnants: list[Remnant]) -> Discrepancy:
         raise InputError(f"a discrepancy cannot be learnt from {len(remnants)} specimens: at least three are needed")
     n = len(remnants)
     few = (n + 2) / n
-    amplitude, remainder = np.zeros((len(ALL), 3)), np.zeros(3)
-    pooled = [(r.observation.sight, *r.waves(), *r.local()) for r in remnants]
+    remainder = _by_stage([(r.observation.sight, *r.local()) for r in remnants], few)
+    waves = [(r.observation.sight, *r.waves(remainder)) for r in remnants]
+    amplitude = _by_stage(waves, few)
+    standard, heard = [], []
+    for sight, wave, hiss in waves:
+        size = np.stack([along_cmod(a, sight.progress) for a in np.where(amplitude > 0, amplitude, np.inf)])
+        standard.append(np.sqrt(few) * wave / size)
+        heard.append(1 / (1 + hiss / size**2))
+    correlation = _correlation([w * h for w, h in zip(standard, heard, strict=True)], n)
+    sights = [sight for sight, *_ in waves]
+    return Discrepancy(amplitude, correlation, remainder[0], _length(sights, standard, heard), samples=n)
+
+
+def _by_stage(parts: list[tuple[Sight, np.ndarray, np.ndarray]], factor: float) -> np.ndarray:
+    """Standard deviations (k, 3) beyond noise in the three stages, from values (k, s) and the noise's variances."""
+    found = []
     for stage in range(len(STAGES)):
-        chosen = [sight.stage == stage for sight, *_ in pooled]
-        wave = np.concatenate([w[:, c] for c, (_, w, *_) in zip(chosen, pooled, strict=True)], axis=1)
-        hiss = np.concatenate([h[:, c] for c, (_, _, h, *_) in zip(chosen, pooled, strict=True)], axis=1)
-        square = np.concatenate([q[c] for c, (*_, q, _) in zip(chosen, pooled, strict=True)])
-        noise = np.concatenate([q[c] for c, (*_, q) in zip(chosen, pooled, strict=True)])
-        amplitude[:, stage] = _root_mean(wave**2, hiss, few)
-        remainder[stage] = _root_mean(square[None], noise[None], few)[0]
-    standard = [w / np.stack([along_cmod(a, s.progress) for a in _positive(amplitude)]) for s, w, *_ in pooled]
-    correlation = _correlation(standard, n)
-    return Discrepancy(amplitude, correlation, remainder, _length(pooled, standard), samples=n)
+        value = np.concatenate([v[:, sight.stage == stage] for sight, v, _ in parts], axis=1)
+        noise = np.concatenate([h[:, sight.stage == stage] for sight, _, h in parts], axis=1)
+        found.append(_root_mean(value**2, noise, factor))
+    return np.column_stack(found)
 
 
 def _root_mean(square: np.ndarray, noise: np.ndarray, factor: float) -> np.ndarray:
@@ -166,10 +183,6 @@ def _root_mean(square: np.ndarray, noise: np.ndarray, factor: float) -> np.ndarr
     total = np.where(known, square, 0.0).sum(axis=1) / count
     beyond = total - np.where(known, noise, 0.0).sum(axis=1) / count
     return np.sqrt(factor * np.maximum(beyond, 0.1 * total))
-
-
-def _positive(amplitude: np.ndarray) -> np.ndarray:
-    return np.where(amplitude > 0, amplitude, np.inf)
 
 
 def _correlation(standard: list[np.ndarray], specimens: int) -> np.ndarray:
@@ -187,16 +200,19 @@ def _correlation(standard: list[np.ndarray], specimens: int) -> np.ndarray:
     return kept * moment / np.outer(scale, scale) * (1 - np.eye(k)) + np.eye(k)
 
 
-def _length(pooled: list, standard: list[np.ndarray]) -> float:
-    """The length (m) whose exponential is nearest to the correlation of amplitudes at two stations."""
-    apart, product = [], []
-    for (sight, *_), wave in zip(pooled, standard, strict=True):
+def _length(sights: list[Sight], standard: list[np.ndarray], heard: list[np.ndarray]) -> float:
+    """The length (m) whose exponential is nearest to the products of amplitudes at two stations.
+
+    Amplitudes (k, s) of unit variance count by the share (k, s) of what is heard that is not noise.
+    """
+    apart, product, weight = [], [], []
+    for sight, wave, loud in zip(sights, standard, heard, strict=True):
         row, column = np.triu_indices(sight.cmod.size, 1)
-        level = np.nanmean(wave**2)
-        both = np.nanmean(wave[:, row] * wave[:, column], axis=0) / level
+        both, sure = wave[:, row] * wave[:, column], loud[:, row] * loud[:, column]
         known = np.isfinite(both)
-        apart.append(np.abs(sight.cmod[row] - sight.cmod[column])[known])
+        apart.append(np.broadcast_to(np.abs(sight.cmod[row] - sight.cmod[column]), both.shape)[known])
         product.append(both[known])
-    distance, found = np.concatenate(apart), np.concatenate(product)
-    wrong = [np.mean((found - np.exp(-distance / length)) ** 2) for length in LENGTHS]
+        weight.append(sure[known])
+    distance, found, loud = (np.concatenate(x) for x in (apart, product, weight))
+    wrong = [np.sum(loud * (found - np.exp(-distance / length)) ** 2) for length in LENGTHS]
     return float(LENGTHS[int(np.argmin(wrong))])

@@ -103,8 +103,8 @@ class Emulator:
 
     @property
     def inner(self) -> np.ndarray:
-        """Bounds inside the outermost cells of the grid; (2, 2)."""
-        return np.array([(x[1], x[-2]) for x in (self.f_max, self.delta_max)])
+        """Bounds in the middle of the outermost cells of the grid; (2, 2)."""
+        return np.array([((x[0] + x[1]) / 2, (x[-2] + x[-1]) / 2) for x in (self.f_max, self.delta_max)])
 
     def response(self, parameters: np.ndarray, physics: Mapping[str, float]) -> Response:
         """What a simulation would say."""

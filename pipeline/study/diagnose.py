@@ -24,7 +24,7 @@ from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
 from pipeline.study.diagnose_result import diagnosis_result, sentence
-from pipeline.study.diagnose_sight import HALF, Seen, own_path, seen, with_sides
+from pipeline.study.diagnose_sight import HALF, SPACINGS, Seen, beside, own_path, seen
 from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
 from pipeline.study.effects import Band, held_to, lattice_problem, planned, settled
@@ -159,7 +159,7 @@ def diagnose(
     )  # fmt: skip
     start = start_parameters(read)
     band = band_of(look, simulator, start)
-    look = replace(look, observation=with_sides(look.observation, band.path))
+    look = replace(look, observation=beside(look.observation, band.path))
     result, diagnosis = judged(read, model, look, replace(simulator, band=band), settings.seed, without)
     result |= {"seconds": time.monotonic() - started, "engine": engine or ENGINE}
     write_result(folder, result)
@@ -171,7 +171,7 @@ def diagnose(
 
 def band_of(look: Seen, simulator: Simulator, start: tuple[float, float]) -> Band:
     """The strip around the measured crack; around the model's own at the start where none is seen."""
-    half = HALF * 2 * simulator.model.particles.radius
+    half = max(HALF, SPACINGS * 2 * simulator.model.particles.radius)
     if look.path is not None:
         return Band(look.path, half)
     simulator.progress.stage("the model's own crack path")

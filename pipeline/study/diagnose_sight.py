@@ -19,8 +19,8 @@ from pipeline.store.bundle import Bundle
 from pipeline.study.assembly import frame_stations
 from pipeline.study.observation import nearest_points
 
-HALF = 4.0  # half width of the band, in particle spacings
-CLEAR = 1.5  # mm; points nearer to the crack than this may have changed flank, and are left out
+HALF, SPACINGS = 3 * MM, 1.5  # half width of the band: so wide, but no less than so many particle spacings
+CLEAR = 3 * MM  # points nearer to the crack may lie on the other flank of the model's, and are left out
 BEYOND = 1.06  # of the last station: how far simulations go, for gauges that read too little
 STANDS_OUT = 6.0  # robust deviations by which neighbours beside the crack part more than others
 LEAST_PATH = 5 * MM  # a measured crack shorter than this says nothing of the path
@@ -71,7 +71,7 @@ def seen(bundle: Bundle) -> Seen:
     path = None if field is None else crack_path(field, bundle.specimen)
     if field is not None and path is None:
         remarks.append("the fields show no crack path: the model's own is taken")
-    observation = _observation(bundle, curve, field, stations, path)
+    observation = _observation(bundle, curve, field, stations)
     return Seen(observation, abscissae(stations, curve), path, tuple(remarks))
 
 
@@ -82,7 +82,7 @@ def _ramp(bundle: Bundle, field: DisplacementField | None) -> LoadCurve:
 
 
 def _observation(
-    bundle: Bundle, curve: LoadCurve, field: DisplacementField | None, stations: np.ndarray, path: np.ndarray | None
+    bundle: Bundle, curve: LoadCurve, field: DisplacementField | None, stations: np.ndarray
 ) -> Observation:
     specimen = bundle.specimen
     points, values, std = _picked(bundle, curve, field, stations)
@@ -92,7 +92,7 @@ def _observation(
         cmod=stations,
         time=curve.time_at(stations),
         points=points,
-        side=sides(points, path),
+        side=sides(points, None),
         tip=np.array(specimen.tip),
         peak_cmod=float(peak),
         centre=(low + high) / 2,
@@ -101,8 +101,6 @@ def _observation(
         end_cmod=float(curve.cmod.max()),
         contacts=contacts(specimen),
     )
-    if path is not None:
-        values = np.where(clear_of(points, path)[:, None], values, np.nan)
     load = curve.load_at(stations)
     load_std = (
         np.full(stations.size, np.nan) if curve.load_std is None else np.interp(stations, curve.cmod, curve.load_std)
@@ -199,7 +197,7 @@ def clear_of(points: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Which points (p,) are so far from the path that nothing can have put them on the other flank."""
     along = np.vstack([np.linspace(a, b, 20) for a, b in pairwise(path)])
     distance = np.hypot(*(points[:, None] - along).transpose(2, 0, 1)).min(axis=1)
-    return distance > CLEAR * MM
+    return distance > CLEAR
 
 
 def abscissae(stations: np.ndarray, curve: LoadCurve) -> Abscissae:
@@ -231,7 +229,10 @@ def own_path(position: np.ndarray, pairs: np.ndarray, share: np.ndarray, tip: np
     return np.vstack([tip, *rows]) if rows else np.vstack([tip, tip + np.array([0.0, 1 * MM])])
 
 
-def with_sides(observation: Observation, path: np.ndarray) -> Observation:
-    """The same points on the flanks that another path gives them."""
-    sight = replace(observation.sight, side=sides(observation.sight.points, path))
-    return replace(observation, sight=sight)
+def beside(observation: Observation, path: np.ndarray) -> Observation:
+    """The same test with the flanks that a path gives the points, without the points that lie too near to it."""
+    points = observation.sight.points
+    near = ~clear_of(points, path)
+    field = np.where(near[:, None], np.nan, observation.reading.field)
+    sight = replace(observation.sight, side=sides(points, path))
+    return replace(observation, sight=sight, reading=Reading(field, observation.reading.load))

@@ -27,11 +27,11 @@ from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import build_model
 from pipeline.study.diagnose import ENGINE, Simulator, band_of
-from pipeline.study.diagnose_sight import seen, with_sides
+from pipeline.study.diagnose_sight import beside, seen
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.virtual_test import virtual_test
 
-FACTORS = (0.7, 0.9, 1.1, 1.35)  # of the start, for f_max and delta_max
+FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
 
@@ -103,10 +103,10 @@ def one_specimen(
     )  # fmt: skip
     start = start_parameters(bundle)
     band = band_of(look, simulator, start)
-    observation = with_sides(look.observation, band.path)
+    observation = beside(look.observation, band.path)
     design = Design(start, FACTORS, FACTORS)
     provisional = Entry(Domain(geometry, (0.0, 1.0), 1.0, NOISE), assumed(), 1.0, 0, {})
-    emulator = baseline(observation, look.abscissae, replace(simulator, band=band), design, provisional)
+    emulator, _ = baseline(observation, look.abscissae, replace(simulator, band=band), design, provisional)
     return Specimen(folder.name, observation, emulator)
 
 
