@@ -8,18 +8,17 @@ the far bonds are looked at: one that would have been damaged becomes active, as
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from pipeline.equilibrium.assembly import Assembly, assembly
-from pipeline.equilibrium.factor import factorise
+from pipeline.equilibrium.factor import Solve, factorise, rough_solve
 from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
-from pipeline.materials.cohesive import LinearSoftening
+from pipeline.materials.cohesive import CentralSoftening
 
 BATCH = 64  # right-hand sides at a time
 
@@ -42,7 +41,6 @@ class CondensedNetwork:
     support: np.ndarray
     islands: Islands
     assembly: Assembly
-    ordered: ClassVar[bool] = True
 
     @property
     def kept(self) -> int:
@@ -62,14 +60,29 @@ class CondensedNetwork:
 
     def stiffness(self, weight: np.ndarray, free: np.ndarray, machine: float) -> sparse.csc_array:
         """Without the coupling of strip and islands, which is weak: still positive definite."""
+        inner, apart = self._blocks(weight)
+        return sparse.block_diag([inner, sparse.csc_array(apart)], format="csc") if apart.size else inner
+
+    def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
+        inner, apart = self._blocks(weight)
+        strip = rough_solve(inner, ordered=True)
+        if not apart.size:
+            return strip
+        factor = linalg.cho_factor(apart.astype(np.float32), lower=True, overwrite_a=True, check_finite=False)
+
+        def solve(right: np.ndarray) -> np.ndarray:
+            last = right[self.kept :].astype(np.float32)
+            return np.append(strip(right[: self.kept]), linalg.cho_solve(factor, last, check_finite=False))
+
+        return solve
+
+    def _blocks(self, weight: np.ndarray) -> tuple[sparse.csc_array, np.ndarray]:
+        """Stiffnesses of the strip and of the islands, N/m, for bonds of `weight` (m,), N/m."""
         strip, islands = self.bonds.drive.size, self.islands
         soft = weight[strip:] - islands.k_n
         row = islands.row[:, :-1]
         inner = self.assembly.stiffness(weight[:strip], self.support[:-1, :-1] + row.T @ (soft[:, None] * row))
-        if not islands.count:
-            return inner
-        apart = sparse.csc_array(islands.inverse + np.diag(soft))
-        return sparse.block_diag([inner, apart], format="csc")
+        return inner, islands.inverse + np.diag(soft)
 
     def energy(self, free: np.ndarray, machine: float) -> float:
         moved = self._moved(free, machine)
@@ -119,7 +132,7 @@ class CondensedModel:
     strip: np.ndarray
     kept: np.ndarray
     network: CondensedNetwork
-    law: LinearSoftening
+    law: CentralSoftening
     gauge: np.ndarray
     gauge_drive: float
     far: FarField
@@ -211,10 +224,10 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     )
 
 
-def _divisible(whole: WholeModel) -> tuple[SmallNetwork, LinearSoftening]:
+def _divisible(whole: WholeModel) -> tuple[SmallNetwork, CentralSoftening]:
     """Network and law of a model that can be condensed."""
     network, law = whole.network, whole.law
-    if not isinstance(network, SmallNetwork) or not isinstance(law, LinearSoftening):
+    if not isinstance(network, SmallNetwork) or not isinstance(law, CentralSoftening):
         raise TypeError("only linear kinematics and a law that can be divided are condensed")
     return network, law
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from pipeline.core.errors import InputError
+
+Solve = Callable[[np.ndarray], np.ndarray]
 
 SYMMETRIC = {"SymmetricMode": True}
 
@@ -37,8 +41,8 @@ def factorise_elastic(stiffness: sparse.csc_array) -> SuperLU:
     return factor
 
 
-def factorise_roughly(stiffness: sparse.csc_array, ordered: bool) -> SuperLU:
-    """Factors that only measure steps and decide no result: single precision halves what a solution reads.
+def rough_solve(stiffness: sparse.csc_array, ordered: bool = False) -> Solve:
+    """Solutions that only measure steps and decide no result: single precision halves what each has to read.
 
     `ordered`: the variables already stand in a good order of elimination.
     """
@@ -46,4 +50,5 @@ def factorise_roughly(stiffness: sparse.csc_array, ordered: bool) -> SuperLU:
     single = sparse.csc_array(
         (stiffness.data.astype(np.float32), stiffness.indices, stiffness.indptr), shape=stiffness.shape
     )
-    return splu(single, permc_spec=order, diag_pivot_thresh=0.0, options=SYMMETRIC)
+    factor = splu(single, permc_spec=order, diag_pivot_thresh=0.0, options=SYMMETRIC)
+    return lambda right: factor.solve(right.astype(np.float32)).astype(float)

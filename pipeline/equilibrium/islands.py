@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, sparse
 
-YIELD = 1e-6  # of 1/K^n: compliance left to a motion that the far field does not allow
+YIELD = 1e-6  # of 1/K^n: compliance given to every bond, for motions that the far field does not allow
 
 
 @dataclass(frozen=True)
@@ -100,10 +100,11 @@ def joined(
 
 
 def _inverse(compliance: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """C⁻¹ (k, k), where `root` (k,) is √K^n; bonds that hinder each other yield by `YIELD` instead of not at all.
+    """C⁻¹ (k, k), where `root` (k,) is √K^n; every bond yields by `YIELD`, so that it exists.
 
     The eigenvalues of √K^n C √K^n lie between 0, bonds being statically indeterminate among themselves, and 1.
     """
-    share, way = linalg.eigh(root[:, None] * compliance * root)
-    scaled = root[:, None] * way
-    return (scaled / np.maximum(share, YIELD)) @ scaled.T
+    share = root[:, None] * compliance * root
+    share[np.diag_indices_from(share)] += YIELD
+    inverse = linalg.cho_solve(linalg.cho_factor(share, check_finite=False), np.eye(root.size), check_finite=False)
+    return root[:, None] * (inverse + inverse.T) / 2 * root

@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.core.problem import CohesiveLaw, Problem
+from pipeline.core.problem import Problem
 from pipeline.equilibrium.constraints import Constraints
 from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
-from pipeline.materials.cohesive import central_law
+from pipeline.materials.cohesive import CentralSoftening, central_law
 
 
 class Model(Protocol):
@@ -19,7 +19,7 @@ class Model(Protocol):
     @property
     def network(self) -> Network: ...
     @property
-    def law(self) -> CohesiveLaw: ...
+    def law(self) -> CentralSoftening: ...
     @property
     def gauge(self) -> np.ndarray: ...
     @property
@@ -32,14 +32,14 @@ class WholeModel:
 
     Parameters
     ----------
-    law : CohesiveLaw
+    law : CentralSoftening
     network : SmallNetwork or FiniteNetwork
     constraints : Constraints
     gauge : (q,) array, ∂CMOD/∂q
     gauge_drive : float, ∂CMOD/∂s
     """
 
-    law: CohesiveLaw
+    law: CentralSoftening
     network: SmallNetwork | FiniteNetwork
     constraints: Constraints
     gauge: np.ndarray

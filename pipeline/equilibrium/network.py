@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse
 
 from pipeline.core.problem import Kinematics, Problem
 from pipeline.equilibrium.constraints import Constraints, eliminate
+from pipeline.equilibrium.factor import Solve, rough_solve
 
 
 class Network(Protocol):
@@ -27,9 +28,8 @@ class Network(Protocol):
         """Stiffness (q, q), N/m, of bonds with stiffness `weight` (m,), N/m."""
         ...
 
-    @property
-    def ordered(self) -> bool:
-        """Whether the variables stand in a good order of elimination."""
+    def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
+        """Steps (q,), m, under forces (q,), N, by that stiffness, in single precision."""
         ...
 
     def energy(self, free: np.ndarray, machine: float) -> float:
@@ -50,7 +50,6 @@ class SmallNetwork:
     jacobian: sparse.csr_array
     transpose: sparse.csr_array
     drive: np.ndarray
-    ordered: ClassVar[bool] = False
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         return self.jacobian @ free + machine * self.drive
@@ -60,6 +59,9 @@ class SmallNetwork:
 
     def stiffness(self, weight: np.ndarray, free: np.ndarray, machine: float) -> sparse.csc_array:
         return (self.transpose @ (self.jacobian * weight[:, None])).tocsc()
+
+    def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
+        return rough_solve(self.stiffness(weight, free, machine))
 
     def energy(self, free: np.ndarray, machine: float) -> float:
         return 0.0
@@ -84,7 +86,6 @@ class FiniteNetwork:
     arm: np.ndarray
     pairs: np.ndarray
     constraints: Constraints
-    ordered: ClassVar[bool] = False
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         relative = self._relative(free, machine)
@@ -103,6 +104,9 @@ class FiniteNetwork:
         """Material part only: the geometric part, force over length, is about 1e-3 of it and may be negative."""
         jacobian, _ = _jacobian(self._direction(free, machine), self.pairs, self.constraints)
         return (jacobian.T @ (jacobian * weight[:, None])).tocsc()
+
+    def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
+        return rough_solve(self.stiffness(weight, free, machine))
 
     def energy(self, free: np.ndarray, machine: float) -> float:
         return 0.0

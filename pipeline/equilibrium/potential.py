@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import SuperLU
 
-from pipeline.core.problem import CohesiveLaw
-from pipeline.equilibrium.factor import factorise_roughly
+from pipeline.equilibrium.factor import Solve
 from pipeline.equilibrium.network import Network
+from pipeline.materials.cohesive import CentralSoftening
+from pipeline.materials.softening import Unloading
 
 SOFTENING_SHARE = 0.2  # of the secant stiffness of softening bonds; 1 needs a fifth more iterations, 0.03 no fewer
 FLOOR = 1e-6  # of K^n: left to broken bonds in the preconditioner, which loose particles would make singular
@@ -28,7 +27,7 @@ class Potential:
     """
 
     network: Network
-    law: CohesiveLaw
+    law: CentralSoftening
     reached: np.ndarray
 
     def gradient(self, free: np.ndarray, machine: float) -> np.ndarray:
@@ -47,19 +46,21 @@ class Potential:
         bonds = float(self.law.stored(opening, reached).sum() + self.law.dissipated(reached).sum())
         return bonds + self.network.energy(free, machine)
 
-    def metric(self, free: np.ndarray, machine: float) -> sparse.csc_array:
-        """Stiffness (q, q), N/m, that stands for the Hessian: positive definite.
+    def measure(self, free: np.ndarray, machine: float) -> Solve:
+        """Steps by a stiffness that stands for the Hessian: positive definite.
 
         Force over opening for every bond, but a share of it for bonds on their softening branch: their
         tangent is negative. All of it would majorise the potential, and is stiffer than needed.
         """
         opening = self.network.opening(free, machine)
-        tension = opening > 0
-        at = np.where(tension, opening, 1.0)
-        weight = np.where(tension, self.law.force(at, self.reached) / at, self.law.k_n)
+        at = np.where(opening > 0, opening, 1.0)
+        force = self.law.force(at, self.reached)
+        weight = np.where(opening > 0, force / at, self.law.k_n)
+        if self.law.unloading is Unloading.ELASTIC:
+            weight = np.where((opening > 0) & (opening < self.reached) & (force > 0), self.law.k_n, weight)
         softening = (opening > self.law.delta_peak) & (opening >= self.reached)
         weight = np.where(softening, SOFTENING_SHARE * weight, weight)
-        return self.network.stiffness(np.maximum(weight, FLOOR * self.law.k_n), free, machine)
+        return self.network.measure(np.maximum(weight, FLOOR * self.law.k_n), free, machine)
 
 
 @dataclass
@@ -68,7 +69,7 @@ class SecantPreconditioner:
 
     potential: Potential | None = None
     machine: float = 0.0
-    factor: SuperLU | None = None
+    factor: Solve | None = None
 
     def move(self, potential: Potential, machine: float) -> None:
         """Serve another potential, with the old factorisation until it is renewed."""
@@ -77,10 +78,9 @@ class SecantPreconditioner:
     def renew(self, at: np.ndarray) -> None:
         """Factorise the secant stiffness at this state (q,)."""
         assert self.potential is not None, "move() comes first"
-        metric = self.potential.metric(at, self.machine)
-        self.factor = factorise_roughly(metric, self.potential.network.ordered)
+        self.factor = self.potential.measure(at, self.machine)
 
     def solve(self, gradient: np.ndarray) -> np.ndarray:
         """The step (q,), m, that the factorised stiffness gives under forces (q,), N."""
         assert self.factor is not None, "renew() comes first"
-        return self.factor.solve(gradient.astype(np.float32)).astype(float)
+        return self.factor(gradient)
