@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -42,6 +42,10 @@ def export(
     restart_steps: Annotated[
         int | None, option("--restart-steps", metavar="N", min=20, help="Steps between restart files.")
     ] = None,
+    stock: Annotated[
+        Literal["table", "plastic"] | None,
+        option("--stock", help="Bonds of LAMMPS instead of ours: nothing to compile, less exact."),
+    ] = None,
     config: Config = None,
     debug: Debug = False,
 ) -> None:
@@ -63,6 +67,7 @@ def export(
                 walltime_min=walltime_min,
                 array_limit=array_limit,
                 restart_steps=restart_steps,
+                stock=stock,
                 config=config,
                 progress=progress,
             )

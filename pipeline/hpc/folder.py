@@ -6,15 +6,18 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from string import Template
 
 from pipeline.core.errors import InputError, MissingFileError, StoreError
-from pipeline.core.problem import Problem
+from pipeline.core.problem import Problem, Solution
 from pipeline.hpc.checksums import checksum_list, checksums, sha256
 from pipeline.hpc.manifest import FILE, Manifest, Point, manifest_text, read_manifest
+from pipeline.lmp import simulate
 from pipeline.lmp.deck import DECK, write_deck
+from pipeline.lmp.stock import STOCK_DECK, read_stock_solution, solve_stock, write_stock_deck
 
 INPUTS = "inputs.sha256"
 PLAIN = ("environment", "submit.slurm", "README.md")  # meant to be edited: not in the manifest
@@ -45,16 +48,27 @@ class Job:
 
 @dataclass(frozen=True)
 class Variant:
-    """A kind of deck: its name in the manifest, its file, and how it is written into a folder."""
+    """A kind of deck: its name in the manifest, its file, what it needs, how it is written, read back and run here."""
 
     name: str
     deck: str
     packages: str
     write: Callable[[Path, Problem, int], object]
+    read: Callable[[Problem, Path, float], Solution]
+    solve: Callable[[Problem], Solution] | None = None  # None: as the engine does
+
+
+def _stock(kind: str, packages: str) -> Variant:
+    write, solve = partial(write_stock_deck, kind=kind), partial(solve_stock, kind=kind)
+    return Variant(kind, STOCK_DECK, packages, write, read_stock_solution, solve)
 
 
 VARIANTS = {
-    "cohesive": Variant("cohesive", DECK, "MOLECULE and PLUGIN (or the style built in)", write_deck),
+    "cohesive": Variant(
+        "cohesive", DECK, "MOLECULE and PLUGIN (or the style built in)", write_deck, simulate.read_solution
+    ),
+    "table": _stock("table", "MOLECULE"),
+    "plastic": _stock("plastic", "MOLECULE and BPM, of April 2025 or later,"),
 }
 
 

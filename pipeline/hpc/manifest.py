@@ -47,7 +47,7 @@ class Manifest:
     study : str; SHA-256 of the keys of the first points: studies are told apart by it
     version : str; of the program that exported
     bundle : str; name of the test
-    variant : str; "cohesive" or "stock", the deck
+    variant : str; the kind of deck: "cohesive", or a stock approximation, "table" or "plastic"
     engine : str; label under which the simulations are kept
     settings : settings of the run
     lammps : name of a version of LAMMPS → whether the decks were tested with it

@@ -10,9 +10,8 @@ from pathlib import Path
 from pipeline.core.errors import PipelineError
 from pipeline.core.problem import Problem, Solution
 from pipeline.hpc.checksums import changed, read_checksum_list, sha256
-from pipeline.hpc.folder import INPUTS
+from pipeline.hpc.folder import INPUTS, VARIANTS
 from pipeline.hpc.manifest import Manifest, Point
-from pipeline.lmp.simulate import read_solution
 
 RESULTS = "results.sha256"
 
@@ -78,7 +77,7 @@ def _results_of(folder: Path, point: Point, again: str) -> Found:
     return Found(point, State.DAMAGED, f"{wrong[0]}; {again}") if wrong else Found(point, State.DONE)
 
 
-def solution_of(study: Path, point: Point, problem: Problem) -> Solution:
+def solution_of(study: Path, manifest: Manifest, point: Point, problem: Problem) -> Solution:
     """The solution of a point that is done.
 
     Raises
@@ -87,7 +86,7 @@ def solution_of(study: Path, point: Point, problem: Problem) -> Solution:
         naming the file that cannot be read as this problem's
     """
     try:
-        return read_solution(problem, study / point.folder, 0.0)
+        return VARIANTS[manifest.variant].read(problem, study / point.folder, 0.0)
     except (OSError, ValueError, IndexError) as error:
         raise PipelineError(f"{point.folder} cannot be read ({error}): run point {point.number} again") from error
 

@@ -88,3 +88,17 @@ def read_reached(path: Path, pairs: np.ndarray) -> np.ndarray:
     if len(rows) != len(pairs) or not np.array_equal(key[order][at], wanted):
         raise StoreError(f"{path} does not hold the {len(pairs)} bonds of this problem")
     return rows[order[at], 4]
+
+
+def read_stretched(path: Path, pairs: np.ndarray) -> np.ndarray:
+    """Length, undeformed and relaxed length (m, 3) in m of each bond of `pairs`; NaN where it has parted."""
+    _, _, body = path.read_text(encoding="ascii").partition("ITEM: ENTRIES")
+    rows = _numbers(body.partition("\n")[2], 6, path)
+    ends = np.sort(rows[:, 1:3].astype(np.int64) - 1, axis=1)
+    place = {(i, j): k for k, (i, j) in enumerate(np.sort(pairs, axis=1).tolist())}
+    found = np.full((len(pairs), 3), np.nan)
+    for (i, j), row in zip(ends.tolist(), rows, strict=True):
+        if (i, j) not in place:
+            raise StoreError(f"{path} holds a bond of {i + 1} and {j + 1}, which is none of this problem's")
+        found[place[i, j]] = row[3:]
+    return found

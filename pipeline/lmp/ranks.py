@@ -69,9 +69,9 @@ def _solve_in(problem: Problem, ranks: int, folder: Path) -> Solution:
     return read_solution(problem, folder, (time.monotonic() - start) * ranks)
 
 
-def run(folder: Path, ranks: int, *more: str) -> None:
-    """Run the deck of a folder on ranks, with more words on the command line of LAMMPS."""
-    line = [launcher(), "-n", ranks, program(), "-in", DECK, "-screen", "none", "-nocite", *more]
+def run(folder: Path, ranks: int, *more: str, deck: str = DECK) -> None:
+    """Run a deck of a folder on ranks, with more words on the command line of LAMMPS."""
+    line = [launcher(), "-n", ranks, program(), "-in", deck, "-screen", "none", "-nocite", *more]
     done = subprocess.run(
         [str(word) for word in line],
         cwd=folder,

@@ -12,10 +12,12 @@ from pipeline.core.errors import StoreError
 from pipeline.core.problem import Problem
 from pipeline.execution.dask_workers import executor_of
 from pipeline.execution.progress import Progress, Silent
+from pipeline.hpc.folder import VARIANTS
 from pipeline.hpc.manifest import Manifest, Point, read_manifest
 from pipeline.hpc.points import Found, State, damaged_files, lammps_versions, look_at, solution_of
 from pipeline.store.bundle import read_bundle
 from pipeline.store.problem_key import problem_key
+from pipeline.study.engines import Engine
 from pipeline.study.export import BUNDLE
 from pipeline.study.identify import Campaign, conclude, first_grid, prepare, run_optimum, search
 
@@ -42,7 +44,8 @@ def collect(out: Path, *, workers: int | None = None, dask: str | None = None, p
     settings = run_settings(manifest.settings | {"workers": workers, "dask": dask, "ranks": 1}, "manifest.json")
     with executor_of(settings.dask) as executor:
         campaign, aim, folder = prepare(read_bundle(Path(out) / BUNDLE), out, settings, told, executor)
-        campaign = replace(campaign, engine=replace(campaign.engine, label=manifest.engine))
+        solve = VARIANTS[manifest.variant].solve or campaign.engine.solve
+        campaign = replace(campaign, engine=Engine(manifest.engine, solve))
         keep_points(campaign, out, manifest)
         found = search(campaign, aim)
         problem, optimum = run_optimum(campaign, found)
@@ -62,7 +65,7 @@ def keep_points(campaign: Campaign, out: Path, manifest: Manifest) -> None:
     campaign.progress.begin(len(problems), 0, "point")
     wrong = []
     for point, problem in zip(manifest.points, problems, strict=True):
-        found = keep_point(campaign, out, point, problem)
+        found = keep_point(campaign, Path(out), manifest, point, problem)
         if found is None:
             campaign.progress.done(point.folder)
         else:
@@ -73,15 +76,15 @@ def keep_points(campaign: Campaign, out: Path, manifest: Manifest) -> None:
         raise StoreError("\n".join([head, *map(str, wrong)]))
 
 
-def keep_point(campaign: Campaign, out: Path, point: Point, problem: Problem) -> Found | None:
+def keep_point(campaign: Campaign, out: Path, manifest: Manifest, point: Point, problem: Problem) -> Found | None:
     """Put one simulation into the store, unless it lies there; what is wrong with it, if anything."""
     if point.key in campaign.store:
         return None
-    found = look_at(Path(out), point)
+    found = look_at(out, point)
     if found.state is not State.DONE:
         return found
     try:
-        campaign.store.put(point.key, solution_of(Path(out), point, problem))
+        campaign.store.put(point.key, solution_of(out, manifest, point, problem))
     except (OSError, RuntimeError, ValueError) as error:
         return Found(point, State.DAMAGED, str(error))
     return None
@@ -109,4 +112,9 @@ def remarks(out: Path, manifest: Manifest) -> tuple[str, ...]:
     """What to know of how the points were run."""
     ran = sorted(lammps_versions(out, manifest))
     told = f"{len(manifest.points)} points were run elsewhere by LAMMPS {', '.join(ran) or 'of an unknown version'}"
-    return (told,)
+    if manifest.variant == "cohesive":
+        return (told,)
+    return (
+        told,
+        f"bonds were those of the stock approximation {manifest.variant!r}: what that costs is in docs/stock.md",
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline import __version__
@@ -45,6 +46,7 @@ def export(
     walltime_min: int | None = None,
     array_limit: int | None = None,
     restart_steps: int | None = None,
+    stock: str | None = None,
     config: Path | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -53,6 +55,7 @@ def export(
     Parameters
     ----------
     bundle, out : folders
+    stock : "table" or "plastic": bonds of LAMMPS stand in for ours, so that nothing has to be compiled
     the others : override the settings of `config`
     """
     options: dict[str, object] = {"grid": grid, "objective": objective, "radius_mm": radius_mm, "accuracy": accuracy}
@@ -64,12 +67,12 @@ def export(
     out, told = Path(out), progress or Silent()
     read = read_bundle(bundle)
     begin_study(out)
-    campaign, nodes, points = planned(read, out, settings, told)
+    variant = VARIANTS[stock or "cohesive"]
+    campaign, nodes, points = planned(read, out, settings, variant.name, told)
     study = study_of([point.key for point in points])
     refuse_another(out, study)
     copy_bundle(read, campaign, out / BUNDLE)
     told.stage(f"{len(points)} decks")
-    variant = VARIANTS["cohesive"]
     problems = [campaign.problem(*node) for node in nodes]
     stretch = settings.restart_steps or default_stretch(problems[0], settings.ranks)
     plain = settings.model_dump(mode="json", exclude_none=True)
@@ -83,10 +86,13 @@ def export(
 
 
 def planned(
-    read: Bundle, out: Path, settings: RunSettings, progress: Progress
+    read: Bundle, out: Path, settings: RunSettings, variant: str, progress: Progress
 ) -> tuple[Campaign, list[tuple[float, float]], list[Point]]:
     """The campaign of a bundle, the nodes of its first grid, and the points that stand for them."""
     campaign, _, _ = prepare(read, out, settings, progress)
+    if variant != "cohesive":
+        label = f"{campaign.engine.label}, stock approximation {variant}"
+        campaign = replace(campaign, engine=replace(campaign.engine, label=label))
     nodes = first_grid(campaign).nodes()
     return campaign, nodes, points_of(campaign, nodes)
 

@@ -14,6 +14,7 @@ from pipeline.cli import app
 from pipeline.core.errors import BundleError, InputError, StoreError
 from pipeline.hpc.manifest import FILE
 from pipeline.lmp.output import read_curve
+from pipeline.lmp.ranks import environment
 from pipeline.study.collect import collect
 from pipeline.study.export import export
 from pipeline.study.identify import identify
@@ -200,3 +201,16 @@ def test_names_of_slurm_are_names(bundle: Path, tmp_path: Path, option: str, nam
     assert result.exit_code == 1
     assert f"slurm_{option[2:]} = {name!r}" in result.stderr
     assert not (tmp_path / "s").exists()
+
+
+def test_a_stock_study_needs_no_style_of_ours(bundle: Path, path: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    export(bundle, out, grid=GRID, restart_steps=1000, accuracy=0.05, stock="table")
+    assert not (out / "style").exists()
+    with (out / "environment").open("a") as file:
+        file.write(f"export LD_LIBRARY_PATH='{environment()['LD_LIBRARY_PATH']}'\nunset LAMMPS_PLUGIN_PATH\n")
+    kill_after(start_point(out, 4, path), 0.3)
+    code, told = run_point(out, 4, path)
+    assert code == 0, told
+    with pytest.raises(StoreError, match=r"1 of 9 points are whole and kept; the fit needs them all"):
+        collect(out)
