@@ -18,6 +18,7 @@ import numpy as np
 
 from pipeline.core.problem import Problem
 from pipeline.explicit.modes import Modes
+from pipeline.materials.mixed_softening import MixedSoftening
 
 PERIODS = 40
 LAG = 0.5
@@ -66,7 +67,12 @@ def loading_rule(problem: Problem, modes: Modes) -> Loading:
 
 def first_damage_load(problem: Problem, modes: Modes) -> float:
     """Load (N) at which the first bond reaches its strength."""
-    pairs = problem.bonds.pairs
-    _, direction = problem.bonds.reference(problem.particles.position)
-    opening = np.sum((modes.response[pairs[:, 1]] - modes.response[pairs[:, 0]]) * direction, axis=1)
-    return float(modes.stiffness / np.max(opening / problem.law.delta_peak))
+    first, second = problem.bonds.pairs.T
+    length, direction = problem.bonds.reference(problem.particles.position)
+    moved = modes.response[second] - modes.response[first]
+    usage = np.maximum(np.sum(moved * direction, axis=1), 0.0) / problem.law.delta_peak
+    if isinstance(problem.law, MixedSoftening):
+        across = moved[:, 1] * direction[:, 0] - moved[:, 0] * direction[:, 1]
+        sliding = across - length / 2 * (modes.rotation[first] + modes.rotation[second])
+        usage = np.hypot(usage, problem.law.k_s * sliding / problem.law.f_shear)
+    return float(modes.stiffness / np.max(usage))

@@ -13,10 +13,13 @@ from pipeline.lmp.law_table import LawTable
 TYPES = (Phase.MASTIC, Phase.AGGREGATE)
 
 
-def write_data_file(path: Path, problem: Problem, table: LawTable, velocity: np.ndarray) -> None:
+def write_data_file(
+    path: Path, problem: Problem, table: LawTable, velocity: np.ndarray, spin: np.ndarray | None = None
+) -> None:
     """Write particles (molecule = stone number), initial velocities (n, 2) in m/s, and bonds.
 
-    Atom style `bond`, SI units, z = 0; particle i of the problem is atom i + 1.
+    Atom style `bond`, SI units, z = 0; particle i of the problem is atom i + 1. Where particles rotate, `spin` (n,) in
+    rad/s goes to a section `Rotations` of angle, spin, torque and moment of inertia, which the drive sets.
     """
     particles, bonds = problem.particles, problem.bonds
     margin = 10 * particles.radius + problem.cmod_max
@@ -28,7 +31,7 @@ def write_data_file(path: Path, problem: Problem, table: LawTable, velocity: np.
         f"{particles.count} atoms",
         f"{bonds.count} bonds",
         f"{len(TYPES)} atom types",
-        f"{len(table.rows)} bond types",
+        f"{len(table.coefficients)} bond types",
         "",
         f"{low[0]:.9g} {high[0]:.9g} xlo xhi",
         f"{low[1]:.9g} {high[1]:.9g} ylo yhi",
@@ -49,5 +52,8 @@ def write_data_file(path: Path, problem: Problem, table: LawTable, velocity: np.
         out.writelines(f"{i} {s} {k} {x:.17g} {y:.17g} 0\n" for i, s, k, x, y in atoms)
         out.write("\nVelocities\n\n")
         out.writelines(f"{i} {u:.17g} {v:.17g} 0\n" for i, u, v in moves)
+        if spin is not None:
+            out.write("\nRotations\n\n")
+            out.writelines(f"{i} 0 {w:.17g} 0 0\n" for i, w in zip(number, spin, strict=True))
         out.write("\nBonds\n\n")
         out.writelines(f"{b} {t} {i} {j}\n" for b, t, i, j in pairs)

@@ -7,11 +7,13 @@ from importlib.resources import as_file, files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from pipeline.core.clock import Clock
 from pipeline.core.problem import Grip, Problem
 from pipeline.explicit.loading import Loading, loading_rule
-from pipeline.explicit.modes import Modes, lowest_modes
+from pipeline.explicit.modes import Modes, lowest_modes, shear_stiffness
 from pipeline.lmp.data_file import write_data_file
 from pipeline.lmp.law_table import LawTable, law_table
+from pipeline.materials.creeping_softening import refuse_timeless
 
 DECK = "fracture.lmp"
 
@@ -25,10 +27,12 @@ def write_deck(folder: Path, problem: Problem, stretch: int = 0) -> Loading:
     problem : Problem
     stretch : int; steps from one restart file to the next, a multiple of the steps between records; 0: none
     """
+    refuse_timeless(problem)
     table = law_table(problem)
     modes = lowest_modes(problem)
     loading = loading_rule(problem, modes)
-    write_data_file(folder / "specimen.data", problem, table, loading.first_rate * modes.response)
+    spin = None if shear_stiffness(problem) is None else loading.first_rate * modes.rotation
+    write_data_file(folder / "specimen.data", problem, table, loading.first_rate * modes.response, spin)
     (folder / "settings.inc").write_text(_settings(problem, loading, stretch), encoding="ascii")
     (folder / "bonds.inc").write_text(_coefficients(table), encoding="ascii")
     (folder / "attachments.inc").write_text(_attachments(problem), encoding="ascii")
@@ -48,6 +52,7 @@ def _settings(problem: Problem, loading: Loading, stretch: int) -> str:
     radius = problem.particles.radius
     values = {
         "kinematics": problem.kinematics.value,
+        "rotation": "off" if shear_stiffness(problem) is None else "on",
         "cmod_max": f"{problem.cmod_max:.17g}",
         # never-deleted bonds stretch by the crack opening: partners must stay within the ghost cutoff
         "cutoff": f"{6 * radius + 2 * problem.cmod_max:.9g}",
@@ -60,9 +65,9 @@ def _settings(problem: Problem, loading: Loading, stretch: int) -> str:
 
 
 def _coefficients(table: LawTable) -> str:
-    lines = ["# type k_n (N/m) f_max (N) delta_max (m); inf: takes no damage"]
-    for k, (row, name) in enumerate(zip(table.rows, table.name, strict=True), 1):
-        lines.append(f"bond_coeff {k} " + " ".join(f"{v:.17g}" for v in row) + f"  # {name}")
+    lines = ["# type k_n (N/m) f_max (N) delta_max (m) options; inf: takes no damage"]
+    for k, (words, name) in enumerate(zip(table.coefficients, table.name, strict=True), 1):
+        lines.append(f"bond_coeff {k} {words}  # {name}")
     return "\n".join(lines) + "\n"
 
 
@@ -88,8 +93,14 @@ def _drive(problem: Problem, loading: Loading, modes: Modes) -> str:
         f"load {loading.first_load:.17g}",
         f"rate {loading.first_rate:.17g} {loading.lowest_rate:.17g} {loading.highest_rate:.17g}",
         f"frames {len(problem.stations)} " + " ".join(f"{s:.17g}" for s in problem.stations),
+        *([] if problem.clock is None else [_clock(problem.clock)]),
     ]
     return " &\n  ".join(words) + "\n"
+
+
+def _clock(clock: Clock) -> str:
+    pairs = zip(clock.cmod, clock.time, strict=True)
+    return f"clock {clock.cmod.size} " + " ".join(f"{c:.17g} {t:.17g}" for c, t in pairs)
 
 
 def _grip(grip: Grip) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import BondLaw
-from pipeline.materials.softening import LINEAR, Softening, Unloading
+from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class CentralSoftening:
         rows = np.broadcast_arrays(*(np.atleast_1d(np.asarray(getattr(self, n), float)) for n in names))
         for name, values in zip(names, rows, strict=True):
             object.__setattr__(self, name, values.copy())
-        object.__setattr__(self, "unloading", Unloading(self.unloading))
+        object.__setattr__(self, "unloading", named_unloading(self.unloading))
         refuse_values(self.k_n, self.f_max, self.delta_max)
         object.__setattr__(self, "delta_peak", self.f_max / self.k_n)
         refuse_brittle(self.delta_max, self.delta_peak)

@@ -22,9 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import InputError
+from pipeline.core.problem import Problem
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.relaxation import Arms, crept, history_force, relax, stored, tangent, total
-from pipeline.materials.softening import LINEAR, Softening, Unloading
+from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class CreepingSoftening:
     unloading: Unloading = Unloading.SECANT
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "unloading", Unloading(self.unloading))
+        object.__setattr__(self, "unloading", named_unloading(self.unloading))
         f_max, delta_max = np.asarray(self.f_max, float), np.asarray(self.delta_max, float)
         _refuse("f_max", f_max, f_max > 0, self.rise)
         _refuse("delta_max", delta_max, (delta_max > 0) | ~np.isfinite(f_max), self.rise)
@@ -201,6 +202,20 @@ class CreepingSoftening:
         envelope = self.envelope(state.reached, state.onset)
         top = envelope / self.k_n if self.unloading is Unloading.ELASTIC else state.reached
         return np.where(some, area - 0.5 * envelope * top, 0.0)
+
+
+def refuse_timeless(problem: Problem) -> None:
+    """Refuse bonds that creep without the time of the test, and a clock that nothing asks.
+
+    Raises
+    ------
+    InputError
+    """
+    creeps = isinstance(problem.law, CreepingSoftening)
+    if creeps and problem.clock is None:
+        raise InputError("bonds that creep need the time of the test: give the problem a clock, t(CMOD)")
+    if problem.clock is not None and not creeps:
+        raise InputError("the problem has a clock, t(CMOD), but no bond creeps: leave it out")
 
 
 def _refuse(name: str, values: np.ndarray, good: np.ndarray, rise: Arms) -> None:

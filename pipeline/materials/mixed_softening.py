@@ -25,7 +25,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.materials.cohesive import CentralSoftening, refuse_brittle, refuse_values
-from pipeline.materials.softening import LINEAR, Softening, Unloading
+from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class MixedSoftening:
         rows = np.broadcast_arrays(*(np.atleast_1d(np.asarray(getattr(self, n), float)) for n in names))
         for name, values in zip(names, rows, strict=True):
             object.__setattr__(self, name, values.copy())
-        object.__setattr__(self, "unloading", Unloading(self.unloading))
+        object.__setattr__(self, "unloading", named_unloading(self.unloading))
         refuse_values(self.k_n, self.f_max, self.delta_max)
         _refuse_shear(self)
         object.__setattr__(self, "delta_peak", self.f_max / self.k_n)
@@ -146,7 +146,7 @@ class MixedSoftening:
         after = step(state, opening, sliding)
         return self._rubbed(state, after, opening, sliding)
 
-    def force(self, state: MixedState, opening: np.ndarray, sliding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def forces(self, state: MixedState, opening: np.ndarray, sliding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """F_n and F_t (m,), N, tension positive, of bonds whose state has been advanced to these openings."""
         failed = state.progress >= self.last
         if self.unloading is Unloading.SECANT:
@@ -160,7 +160,7 @@ class MixedSoftening:
 
     def stored(self, state: MixedState, opening: np.ndarray, sliding: np.ndarray) -> np.ndarray:
         """Recoverable energy (m,), J, at the openings that the state has been advanced to."""
-        normal, shear = self.force(state, opening, sliding)
+        normal, shear = self.forces(state, opening, sliding)
         if self.unloading is Unloading.ELASTIC:
             return 0.5 * (normal**2 / self.k_n + shear**2 / self.k_s)
         failed = state.progress >= self.last

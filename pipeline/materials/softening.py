@@ -55,7 +55,7 @@ class Softening:
     tail: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shape", Shape(self.shape))
+        object.__setattr__(self, "shape", named_shape(self.shape))
         if not 0 <= self.tail <= 1:
             raise InputError(f"tail = {self.tail:g} must be between 0 (linear) and 1 (long tail)")
 
@@ -114,6 +114,20 @@ class Softening:
     def _slopes(self) -> tuple[float, float]:
         """−dg/ds before and after the kink."""
         return (1 - KINK) / self.kink, KINK / (self.end - self.kink)
+
+
+def named_shape(name: str) -> Shape:
+    """The shape of that name, as a bundle or a deck gives it."""
+    if name not in tuple(Shape):
+        raise InputError(f"softening = {name} must be linear, exponential or bilinear-tail")
+    return Shape(name)
+
+
+def named_unloading(name: str) -> Unloading:
+    """The unloading of that name, as a bundle or a deck gives it."""
+    if name not in tuple(Unloading):
+        raise InputError(f"unloading = {name} must be secant or elastic")
+    return Unloading(name)
 
 
 LINEAR = Softening()

@@ -13,7 +13,7 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.explicit.frames import Frame
 from pipeline.explicit.loading import Loading, loading_rule
 from pipeline.explicit.modes import lowest_modes
-from pipeline.materials.cohesive import central_law
+from pipeline.materials.creeping_softening import refuse_timeless
 from pipeline.reference.body import Body, body_of
 from pipeline.reference.drive import Drive, Energies
 from pipeline.reference.record import Record, Window, row
@@ -63,12 +63,14 @@ class Run:
     """
 
     def __init__(self, problem: Problem) -> None:
+        refuse_timeless(problem)
         modes = lowest_modes(problem)
         self.problem, self.body = problem, body_of(problem)
         self.loading: Loading = loading_rule(problem, modes)
         self.damping = Damping(drag=2 * modes.omega, follow=modes.omega)
         self.share = self.loading.record * modes.omega / (2 * np.pi)  # of a period, between two records
-        self.state = at_rest_place(self.body, self.loading.first_rate * modes.response)
+        rate = self.loading.first_rate
+        self.state = at_rest_place(self.body, rate * modes.response, rate * modes.rotation)
         moving = _kinetic(self.body, self.state)  # the specimen starts moving: the machine gave it that energy
         self.drive = Drive(self.loading.first_rate, self.loading.first_load, spent=moving)
         self.energy = Energies(moving, 0.0, 0.0, moving, 0.0)
@@ -97,8 +99,8 @@ class Run:
 
     def _finish_window(self) -> None:
         """Take the means, measure the lag, choose the speed, note a row and, past a station, a frame."""
-        n, law, state = self.window.steps, central_law(self.problem.law, "reference"), self.state
-        stored, used = law.stored(state.opening, state.reached).sum(), law.dissipated(state.reached).sum()
+        n, state = self.window.steps, self.state
+        stored, used = state.memory.stored.sum(), state.memory.used.sum()
         kinetic = _kinetic(self.body, state)
         self.energy = replace(self.energy, stored=float(stored), dissipated=float(used), kinetic=kinetic)
         platen, support = self.window.drive / n, self.window.react / n
@@ -129,4 +131,4 @@ class Run:
 
 def _kinetic(body: Body, state: State) -> float:
     """Kinetic energy, J."""
-    return 0.5 * float(np.sum(body.mass[:, None] * state.velocity**2))
+    return 0.5 * float(np.sum(body.mass[:, None] * state.velocity**2) + np.sum(body.inertia * state.spin**2))

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 
+from pipeline.core.clock import steady
 from pipeline.core.particles import Phase
 from pipeline.core.problem import Kinematics, Problem
 from pipeline.core.specimen import SingleEdgeNotchedBeam
 from pipeline.core.units import GPA, MM
+from pipeline.materials.burgers import Burgers
+from pipeline.materials.creeping_mixture import creeping_law
 from pipeline.materials.elastic import Plane
 from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.attachment import attach_gauge, attach_grips
@@ -27,17 +33,24 @@ def small_beam(
     kinematics: Kinematics = Kinematics.SMALL,
     cmod_max: float = 0.1 * MM,
     accuracy: float = 0.01,
+    poissons_ratio: float = 0.25,
+    mastic: Burgers | None = None,
+    **options: Any,
 ) -> Problem:
-    """The paper's SE(B) with round stones on a grid, or all mastic, at f_max/(2 r t) of 71 N at 0.3 mm."""
+    """The paper's SE(B) with round stones on a grid, or all mastic, at f_max/(2 r t) of 71 N at 0.3 mm.
+
+    `options` are those of a mixture; with `mastic` the bonds creep, by the clock of a test at 0.5 mm/min.
+    """
     packing = hexagonal_packing(PAPER, radius, angle)
     particles, bonds, _ = lay_phases(PAPER, packing, stone_rows() if stones else None)
     f_max, delta_max = 71.0 * radius / (0.3 * MM), 1.14e-4
-    mixture = Mixture(10 * GPA, 50 * GPA, 0.25, Plane.STRAIN, f_max, delta_max)
+    mixture = Mixture(10 * GPA, 50 * GPA, poissons_ratio, Plane.STRAIN, f_max, delta_max, **options)
+    law = mixture.law if mastic is None else partial(creeping_law, mixture, mastic)
     return Problem(
         specimen=PAPER,
         particles=particles,
         bonds=bonds,
-        law=mixture.law(bonds, PAPER.thickness, f_max, delta_max),
+        law=law(bonds, PAPER.thickness, f_max, delta_max),
         grips=attach_grips(PAPER, particles),
         gauge=attach_gauge(PAPER, particles),
         kinematics=kinematics,
@@ -45,6 +58,7 @@ def small_beam(
         stations=np.linspace(0.2, 0.9, 8) * cmod_max,
         accuracy=accuracy,
         cmod_rate=0.5e-3 / 60,
+        clock=None if mastic is None else steady(0.5e-3 / 60),
     )
 
 

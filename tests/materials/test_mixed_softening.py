@@ -30,7 +30,7 @@ def follow(law: MixedSoftening, path: np.ndarray) -> tuple[np.ndarray, MixedStat
     state, forces, energies = law.at_rest(), [], []
     for opening, sliding in path[:, :, None]:
         state = law.advance(state, opening, sliding)
-        forces.append(np.array(law.force(state, opening, sliding))[:, 0])
+        forces.append(np.array(law.forces(state, opening, sliding))[:, 0])
         energies.append([law.stored(state, opening, sliding)[0], state.used[0]])
     return np.array(forces), state, np.array(energies)
 

@@ -1,6 +1,9 @@
-/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* SPDX-License-Identifier: GPL-2.0-or-later
+   What LAMMPS asks of a bond style: settings, coefficients, lists, output, restart. The forces: bond_cohesive_forces.cpp */
 
 #include "bond_cohesive.h"
+
+#include "cohesive_coeff.h"
 
 #include "atom.h"
 #include "comm.h"
@@ -10,30 +13,36 @@
 #include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "update.h"
 #include "utils.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 using namespace LAMMPS_NS;
 
-// history of one bond: delta_reached, and the undeformed vector from the storing atom to its partner
-static constexpr int NHISTORY = 3;
 static constexpr const char *HISTORY_NAME = "cohesive_history";
+static constexpr const char *ROTATION_ID = "COHESIVE_ROTATION";
+static constexpr const char *ROTATION[] = {"theta", "omega", "torque", "inertia"};
+// of compute bond/local: opening, delta_reached, damage, tension, sliding, shear, energy used up; then the history
+static constexpr int NSINGLE = 7, MOST_HISTORY = 6 + cohesive::MOST_ARMS;
 
-void BondCohesive::List::clear()
+void BondCohesive::Part::clear()
 {
-  for (auto *v : {&first, &second, &type, &atom, &slot, &mirror_atom, &mirror_slot}) v->clear();
-  for (auto *v : {&nx, &ny, &length, &k_n, &secant, &limit, &reached}) v->clear();
+  head.clear();
+  intact.clear();
+  for (auto *list : {&worn, &slid, &crept}) list->clear();
 }
 
 BondCohesive::BondCohesive(LAMMPS *lmp) :
-    Bond(lmp), finite(false), history_id("COHESIVE_HISTORY"), history_index(-1), built_calls(-1),
-    built_step(-1)
+    Bond(lmp), finite(false), sliding(false), nhistory(3), history_id("COHESIVE_HISTORY"), history_index(-1),
+    theta(nullptr), torque(nullptr), built_calls(-1), built_step(-1), time_now(0.0), time_seen(NAN), time_given(false)
 {
   writedata = 1;
-  single_extra = 4;
-  svector = new double[4];
+  single_extra = NSINGLE + MOST_HISTORY;
+  svector = new double[NSINGLE + MOST_HISTORY];
 }
 
 BondCohesive::~BondCohesive()
@@ -47,9 +56,11 @@ void BondCohesive::allocate()
 {
   allocated = 1;
   const int n = atom->nbondtypes;
+  if (n >= std::numeric_limits<std::uint16_t>::max()) error->all(FLERR, "bond_style cohesive takes up to 65534 types");
   memory->create(setflag, n + 1, "bond:setflag");
   for (int i = 0; i <= n; i++) setflag[i] = 0;
   law.resize(n + 1);
+  plain.assign(n + 1, {0.0, INFINITY, 0.0, 0.0, 0.0});
 }
 
 void BondCohesive::settings(int narg, char **arg)
@@ -64,32 +75,31 @@ void BondCohesive::settings(int narg, char **arg)
     error->all(FLERR, "kinematics = {} must be small or finite", arg[1]);
 }
 
-void BondCohesive::read_law(int type, double k_n, double f_max, double delta_max)
+void BondCohesive::set_law(int type, const cohesive::Law &own)
 {
-  if (!(k_n > 0.0) || !std::isfinite(k_n)) error->all(FLERR, "k_n = {:g} N/m must be finite and positive", k_n);
-  if (!(f_max > 0.0)) error->all(FLERR, "f_max = {:g} N must be positive (inf: the bond takes no damage)", f_max);
-  if (std::isfinite(f_max)) {
-    if (!(delta_max > 0.0) || !std::isfinite(delta_max))
-      error->all(FLERR, "delta_max = {:g} m must be finite and positive", delta_max);
-    if (!(delta_max > f_max / k_n))
-      error->all(FLERR, "delta_max = {:g} m must be larger than delta_peak = f_max/k_n = {:g} m: raise delta_max or lower f_max",
-                 delta_max, f_max / k_n);
-  }
-  law[type] = {k_n, f_max, delta_max};
+  law[type] = own;
+  const double peak = own.damageable() ? own.delta_peak() : INFINITY;
+  plain[type] = {own.k_n, peak, own.k_s, own.damageable() ? own.k_n / own.f_max : 0.0,
+                 own.damageable() && own.slides() ? own.k_s / own.f_shear : 0.0};
   setflag[type] = 1;
 }
 
-// bond_coeff TYPE K_N F_MAX DELTA_MAX; f_max and delta_max may be inf
+// bond_coeff TYPE K_N F_MAX DELTA_MAX [options]: see cohesive_coeff.h
 void BondCohesive::coeff(int narg, char **arg)
 {
-  if (narg != 4) error->all(FLERR, "bond_coeff of cohesive takes a type, k_n, f_max and delta_max");
+  if (narg < 1) error->all(FLERR, "bond_coeff of cohesive takes a type, k_n, f_max and delta_max");
   if (!allocated) allocate();
   int low, high;
   utils::bounds(FLERR, arg[0], 1, atom->nbondtypes, low, high, error);
-  const auto number = [&](const char *word) {
-    return strcmp(word, "inf") == 0 ? INFINITY : utils::numeric(FLERR, word, false, lmp);
-  };
-  for (int type = low; type <= high; type++) read_law(type, number(arg[1]), number(arg[2]), number(arg[3]));
+  cohesive::Law own;
+  const std::string wrong = cohesive::read_law(std::vector<std::string>(arg + 1, arg + narg), own);
+  if (!wrong.empty()) error->all(FLERR, wrong);
+  for (int type = low; type <= high; type++) set_law(type, own);
+}
+
+bool BondCohesive::creeps() const
+{
+  return std::any_of(law.begin(), law.end(), [](const cohesive::Law &own) { return own.creeps(); });
 }
 
 void BondCohesive::init_style()
@@ -97,20 +107,53 @@ void BondCohesive::init_style()
   if (domain->dimension != 2) error->all(FLERR, "bond_style cohesive is for two dimensions: use 'dimension 2'");
   if (!atom->tag_enable || atom->map_style == Atom::MAP_NONE)
     error->all(FLERR, "bond_style cohesive needs an atom map: use 'atom_modify map yes'");
-  const std::string name = fmt::format("d2_{}", HISTORY_NAME);
+  if (update->whichflag == 2 && comm->me == 0)
+    error->warning(FLERR, "bond_style cohesive remembers the largest opening of a minimizer's trials");
+  sliding = std::any_of(law.begin(), law.end(), [](const cohesive::Law &own) { return own.slides(); });
+  comm_forward = comm_reverse = sliding ? 1 : 0;
+  make_history();
+  step.clear();
+  for (const auto &own : law) step.emplace_back(own, 0.0);
+  if (sliding) make_rotation();
+  built_calls = -1;
+}
+
+void BondCohesive::make_history()
+{
+  nhistory = sliding ? 6 : 3;
+  for (const auto &own : law)
+    if (own.creeps()) nhistory = std::max(nhistory, 6 + own.arms);
   if (!modify->get_fix_by_id(history_id))
-    modify->add_fix(fmt::format("{} all property/atom {} {} writedata no", history_id, name,
-                                NHISTORY * atom->bond_per_atom));
+    modify->add_fix(fmt::format("{} all property/atom d2_{} {} writedata no", history_id, HISTORY_NAME,
+                                nhistory * atom->bond_per_atom));
   int is_double, columns;
   history_index = atom->find_custom(HISTORY_NAME, is_double, columns);
-  if (history_index < 0 || columns < NHISTORY * atom->bond_per_atom)
-    error->all(FLERR, "the stored history of bond_style cohesive does not fit {} bonds per atom", atom->bond_per_atom);
-  built_calls = -1;
+  if (history_index < 0 || columns != nhistory * atom->bond_per_atom)
+    error->all(FLERR, "the stored history of bond_style cohesive does not fit {} values for {} bonds per atom: give "
+               "every bond_coeff, with its options, before the first run", nhistory, atom->bond_per_atom);
+}
+
+// rotations live in a fix property/atom, so that they move with their particles and stand in restart files
+void BondCohesive::make_rotation()
+{
+  int is_double, columns;
+  if (atom->find_custom("cohesive_theta", is_double, columns) >= 0) return;
+  std::string line = fmt::format("{} all property/atom", ROTATION_ID);
+  for (const char *name : ROTATION) line += fmt::format(" d_cohesive_{}", name);
+  modify->add_fix(line);
+}
+
+double *BondCohesive::rotation(const char *name) const
+{
+  int is_double, columns;
+  const int index = atom->find_custom(fmt::format("cohesive_{}", name).c_str(), is_double, columns);
+  if (index < 0 || !is_double || columns != 0) error->all(FLERR, "no per-particle d_cohesive_{}", name);
+  return atom->dvector[index];
 }
 
 double *BondCohesive::history(int i, int slot) const
 {
-  return atom->darray[history_index][i] + NHISTORY * slot;
+  return atom->darray[history_index][i] + nhistory * slot;
 }
 
 bool BondCohesive::list_is_old() const
@@ -128,8 +171,11 @@ int BondCohesive::find_slot(int i, tagint partner) const
 // every bond stored on this rank once; newton_bond off keeps two copies, of which the lower tag's computes
 void BondCohesive::build_list()
 {
-  list.clear();
-  const int nlocal = atom->nlocal;
+  const int nlocal = atom->nlocal, threads = std::max(1, comm->nthreads);
+  part.resize(threads + 1);
+  for (auto &own : part) own.clear();
+  thread_of.resize(nlocal);
+  for (int i = 0; i < nlocal; i++) thread_of[i] = static_cast<std::uint16_t>((bigint) i * threads / nlocal);
   for (int i = 0; i < nlocal; i++) {
     for (int m = 0; m < atom->num_bond[i]; m++) {
       const int type = atom->bond_type[i][m];
@@ -139,146 +185,100 @@ void BondCohesive::build_list()
         error->one(FLERR, "bond atoms {} {} missing on rank {}: raise 'comm_modify cutoff'", atom->tag[i],
                    atom->bond_atom[i][m], comm->me);
       if (force->newton_bond || j >= nlocal)
-        append(i, m, j, -1, -1);
+        append(part_of(i, j), i, m, j, -1);
       else if (atom->tag[i] < atom->tag[j])
-        append(i, m, j, j, find_slot(j, atom->tag[i]));
+        append(part_of(i, j), i, m, j, find_slot(j, atom->tag[i]));
     }
   }
   built_calls = neighbor->ncalls;
   built_step = neighbor->lastcall;
 }
 
-void BondCohesive::append(int i, int slot, int j, int mirror_i, int mirror_slot)
+// the part of the thread that owns both particles; ghosts belong to none, unless there is one thread and it may write
+BondCohesive::Part &BondCohesive::part_of(int i, int j)
+{
+  if (j >= atom->nlocal) return part.size() == 2 && force->newton_bond ? part.front() : part.back();
+  return thread_of[i] == thread_of[j] ? part[thread_of[i]] : part.back();
+}
+
+void BondCohesive::append(Part &own, int i, int slot, int j, int mirror_slot)
 {
   double *kept = history(i, slot);
   if (kept[1] == 0.0 && kept[2] == 0.0) {    // first seen: the present state is the unstretched one
     kept[1] = atom->x[j][0] - atom->x[i][0];
     kept[2] = atom->x[j][1] - atom->x[i][1];
     if (mirror_slot >= 0) {
-      history(mirror_i, mirror_slot)[1] = -kept[1];
-      history(mirror_i, mirror_slot)[2] = -kept[2];
+      history(j, mirror_slot)[1] = -kept[1];
+      history(j, mirror_slot)[2] = -kept[2];
     }
   }
   const double length = std::hypot(kept[1], kept[2]);
   if (length == 0.0) error->one(FLERR, "bond atoms {} {} lie on each other", atom->tag[i], atom->tag[j]);
   const int type = atom->bond_type[i][slot];
-  list.first.push_back(i);
-  list.second.push_back(j);
-  list.nx.push_back(kept[1] / length);
-  list.ny.push_back(kept[2] / length);
-  list.length.push_back(length);
-  list.k_n.push_back(law[type].k_n);
-  list.secant.push_back(law[type].secant(kept[0]));
-  list.limit.push_back(law[type].limit(kept[0]));
-  list.reached.push_back(kept[0]);
-  list.type.push_back(type);
-  list.atom.push_back(i);
-  list.slot.push_back(slot);
-  list.mirror_atom.push_back(mirror_i);
-  list.mirror_slot.push_back(mirror_slot);
-}
-
-// a bond opened farther than ever: rare, so the force loop stays short
-void BondCohesive::grow(size_t b, double delta)
-{
-  const auto &own = law[list.type[b]];
-  list.reached[b] = delta;
-  list.limit[b] = own.limit(delta);
-  list.secant[b] = own.secant(delta);
-  history(list.atom[b], list.slot[b])[0] = delta;
-  if (list.mirror_slot[b] >= 0) history(list.mirror_atom[b], list.mirror_slot[b])[0] = delta;
-}
-
-template <bool FINITE> double BondCohesive::opening(size_t b) const
-{
-  const double *xi = atom->x[list.first[b]], *xj = atom->x[list.second[b]];
-  const double dx = xj[0] - xi[0], dy = xj[1] - xi[1];
-  if (FINITE) return std::sqrt(dx * dx + dy * dy) - list.length[b];
-  return list.nx[b] * dx + list.ny[b] * dy - list.length[b];
-}
-
-template <bool FINITE, bool TALLY> void BondCohesive::forces()
-{
-  double **x = atom->x, **f = atom->f;
-  const int nlocal = atom->nlocal, newton = force->newton_bond;
-  const size_t n = list.size();
-  const int *first = list.first.data(), *second = list.second.data();
-  const double *nx = list.nx.data(), *ny = list.ny.data(), *length = list.length.data(), *k_n = list.k_n.data();
-  for (size_t b = 0; b < n; b++) {
-    const int i = first[b], j = second[b];
-    const double dx = x[j][0] - x[i][0], dy = x[j][1] - x[i][1];
-    double ex = nx[b], ey = ny[b], delta;
-    if (FINITE) {
-      const double distance = std::sqrt(dx * dx + dy * dy);
-      ex = dx / distance;
-      ey = dy / distance;
-      delta = distance - length[b];
-    } else {
-      delta = ex * dx + ey * dy - length[b];
-    }
-    if (delta > list.limit[b]) grow(b, delta);
-    const double tension = (delta < 0.0 ? k_n[b] : list.secant[b]) * delta;
-    const double fx = tension * ex, fy = tension * ey;
-    if (newton || i < nlocal) {
-      f[i][0] += fx;
-      f[i][1] += fy;
-    }
-    if (newton || j < nlocal) {
-      f[j][0] -= fx;
-      f[j][1] -= fy;
-    }
-    if (TALLY)
-      ev_tally_xyz(i, j, nlocal, newton, law[list.type[b]].stored(delta, list.reached[b]), fx, fy, 0.0, -dx, -dy, 0.0);
+  const Intact bond = {kept[1] / length, kept[2] / length, length, 3 * j, static_cast<std::uint16_t>(type),
+                       static_cast<std::uint16_t>(slot)};
+  if (law[type].creeps()) {
+    own.crept.push_back(worn_of(i, bond));
+  } else if (kept[0] > 0.0) {
+    (law[type].slides() ? own.slid : own.worn).push_back(worn_of(i, bond));
+  } else {
+    own.intact.push_back(bond);
+    if (own.head.empty() || own.head.back().atom != i) own.head.push_back({i, 0});
+    own.head.back().end = static_cast<int>(own.intact.size());
   }
 }
 
-void BondCohesive::compute(int eflag, int vflag)
+// a bond with all that is known of it
+BondCohesive::Worn BondCohesive::worn_of(int i, const Intact &bond) const
 {
-  ev_init(eflag, vflag);
-  if (list_is_old()) build_list();
-  if (finite)
-    evflag ? forces<true, true>() : forces<true, false>();
-  else
-    evflag ? forces<false, true>() : forces<false, false>();
+  const int j = bond.second / 3;
+  const auto &own = law[bond.type];
+  const double reached = own.slides() || own.creeps() ? 0.0 : history(i, bond.slot)[0];
+  const int mirror_slot = force->newton_bond || j >= atom->nlocal ? -1 : find_slot(j, atom->tag[i]);
+  return {bond.nx, bond.ny, bond.length, i, j, bond.type, bond.slot, mirror_slot, own.slope(reached),
+          own.plastic(reached), own.limit(reached)};
 }
 
-void BondCohesive::energies(double &stored, double &dissipated)
+// a bond's row, from state to store; the undeformed vector stays
+void BondCohesive::keep(const Worn &bond, const double *row)
 {
-  stored = dissipated = 0.0;
-  for (size_t b = 0; b < list.size(); b++) {
-    // a bond shared by two ranks without newton_bond is computed on both
-    const double share = (!force->newton_bond && list.second[b] >= atom->nlocal) ? 0.5 : 1.0;
-    const auto &own = law[list.type[b]];
-    const double delta = finite ? opening<true>(b) : opening<false>(b);
-    stored += share * own.stored(delta, list.reached[b]);
-    dissipated += share * own.dissipated(list.reached[b]);
-  }
+  const auto write = [&](double *kept) {
+    kept[0] = row[0];
+    for (int k = 3; k < nhistory; k++) kept[k] = row[k];
+  };
+  write(history(bond.first, bond.slot));
+  if (bond.mirror_slot >= 0) write(history(bond.second, bond.mirror_slot));
 }
 
-int BondCohesive::failed()
+bool BondCohesive::read_history(tagint first, tagint second, const double *row)
 {
-  int count = 0;
-  for (size_t b = 0; b < list.size(); b++) {
-    if (!force->newton_bond && list.second[b] >= atom->nlocal && atom->tag[list.first[b]] > atom->tag[list.second[b]])
-      continue;
-    if (list.reached[b] >= law[list.type[b]].delta_max) count++;
+  bool found = false;
+  for (const bool turned : {false, true}) {
+    const int i = atom->map(turned ? second : first);
+    if (i < 0 || i >= atom->nlocal) continue;
+    const int slot = find_slot(i, turned ? first : second);
+    if (slot < 0) continue;
+    double *kept = history(i, slot);
+    for (int k = 0; k < nhistory; k++) kept[k] = (turned && (k == 1 || k == 2)) ? -row[k] : row[k];
+    found = true;
   }
-  return count;
+  forget_lists();
+  return found;
 }
 
-// sum of k_n n⊗n over the bonds of each particle (columns xx, yy, xy), undamaged
-void BondCohesive::add_stiffness(double **sum)
+void BondCohesive::set_time(double physical)
 {
-  if (list_is_old()) build_list();
-  for (size_t b = 0; b < list.size(); b++) {
-    const double k = list.k_n[b], ex = list.nx[b], ey = list.ny[b];
-    for (const int i : {list.first[b], list.second[b]}) {
-      if (!force->newton_bond && i >= atom->nlocal) continue;
-      sum[i][0] += k * ex * ex;
-      sum[i][1] += k * ey * ey;
-      sum[i][2] += k * ex * ey;
-    }
-  }
+  time_given = true;
+  time_now = physical;
+}
+
+// physical time since the last call; simulation time where no fix says otherwise
+double BondCohesive::elapsed()
+{
+  if (!time_given) time_now = update->atime + (update->ntimestep - update->atimestep) * update->dt;
+  const double passed = time_now - time_seen;    // NAN before the first
+  time_seen = time_now;
+  return passed > 0.0 ? passed : 0.0;
 }
 
 double BondCohesive::equilibrium_distance(int /*type*/)
@@ -286,54 +286,30 @@ double BondCohesive::equilibrium_distance(int /*type*/)
   return 0.0;    // each bond has its own undeformed length
 }
 
-// extra values: opening, delta_reached, damage, tension
-double BondCohesive::single(int type, double /*rsq*/, int i, int j, double &fforce)
-{
-  int slot = i < atom->nlocal ? find_slot(i, atom->tag[j]) : -1;
-  double sign = 1.0;
-  int keeper = i;
-  if (slot < 0) {
-    keeper = atom->map(atom->tag[j]);
-    slot = keeper >= 0 && keeper < atom->nlocal ? find_slot(keeper, atom->tag[i]) : -1;
-    sign = -1.0;
-  }
-  fforce = 0.0;
-  for (int k = 0; k < single_extra; k++) svector[k] = 0.0;
-  if (slot < 0) return 0.0;
-  const double *kept = history(keeper, slot);
-  const double dx = sign * (atom->x[j][0] - atom->x[i][0]), dy = sign * (atom->x[j][1] - atom->x[i][1]);
-  const double length = std::hypot(kept[1], kept[2]), distance = std::hypot(dx, dy);
-  const double delta = finite ? distance - length : (kept[1] * dx + kept[2] * dy) / length - length;
-  const auto &own = law[type];
-  const double tension = own.tension(delta, kept[0]);
-  svector[0] = delta;
-  svector[1] = kept[0];
-  svector[2] = own.damage(kept[0]);
-  svector[3] = tension;
-  fforce = distance > 0.0 ? -tension / distance : 0.0;
-  return own.stored(delta, kept[0]);
-}
-
 void BondCohesive::write_restart_settings(FILE *fp)
 {
-  const int flag = finite;
-  fwrite(&flag, sizeof(int), 1, fp);
+  const double settings[2] = {finite ? 1.0 : 0.0, time_seen};
+  fwrite(settings, sizeof(double), 2, fp);
 }
 
 void BondCohesive::read_restart_settings(FILE *fp)
 {
-  int flag = 0;
-  if (comm->me == 0) utils::sfread(FLERR, &flag, sizeof(int), 1, fp, nullptr, error);
-  MPI_Bcast(&flag, 1, MPI_INT, 0, world);
-  finite = flag;
+  double settings[2] = {0.0, 0.0};
+  if (comm->me == 0) utils::sfread(FLERR, settings, sizeof(double), 2, fp, nullptr, error);
+  MPI_Bcast(settings, 2, MPI_DOUBLE, 0, world);
+  finite = settings[0] > 0.0;
+  time_seen = settings[1];
 }
 
+// the coefficients as the words they were given in: what coeff reads is what a restart brings back
 void BondCohesive::write_restart(FILE *fp)
 {
   write_restart_settings(fp);
   for (int type = 1; type <= atom->nbondtypes; type++) {
-    const double row[3] = {law[type].k_n, law[type].f_max, law[type].delta_max};
-    fwrite(row, sizeof(double), 3, fp);
+    const std::string line = cohesive::write_law(law[type]);
+    const int size = static_cast<int>(line.size());
+    fwrite(&size, sizeof(int), 1, fp);
+    fwrite(line.data(), 1, line.size(), fp);
   }
 }
 
@@ -342,22 +318,52 @@ void BondCohesive::read_restart(FILE *fp)
   read_restart_settings(fp);
   allocate();
   for (int type = 1; type <= atom->nbondtypes; type++) {
-    double row[3];
-    if (comm->me == 0) utils::sfread(FLERR, row, sizeof(double), 3, fp, nullptr, error);
-    MPI_Bcast(row, 3, MPI_DOUBLE, 0, world);
-    read_law(type, row[0], row[1], row[2]);
+    int size = 0;
+    if (comm->me == 0) utils::sfread(FLERR, &size, sizeof(int), 1, fp, nullptr, error);
+    MPI_Bcast(&size, 1, MPI_INT, 0, world);
+    std::string line(size, ' ');
+    if (comm->me == 0) utils::sfread(FLERR, line.data(), 1, size, fp, nullptr, error);
+    MPI_Bcast(line.data(), size, MPI_CHAR, 0, world);
+    cohesive::Law own;
+    const std::string wrong = cohesive::read_law(utils::split_words(line), own);
+    if (!wrong.empty()) error->all(FLERR, "restart file: {}", wrong);
+    set_law(type, own);
   }
 }
 
 void BondCohesive::write_data(FILE *fp)
 {
-  for (int type = 1; type <= atom->nbondtypes; type++) {
-    const auto &own = law[type];
-    utils::print(fp, "{} {:.17g} {:.17g} {:.17g}\n", type, own.k_n, own.f_max, own.delta_max);
-  }
+  for (int type = 1; type <= atom->nbondtypes; type++) utils::print(fp, "{} {}\n", type, cohesive::write_law(law[type]));
 }
 
 double BondCohesive::memory_usage()
 {
-  return Bond::memory_usage() + list.first.capacity() * (7.0 * sizeof(int) + 7.0 * sizeof(double));
+  double bytes = Bond::memory_usage() + thread_of.capacity() * sizeof(std::uint16_t);
+  for (const auto &own : part) {
+    bytes += own.intact.capacity() * sizeof(Intact) + own.head.capacity() * sizeof(Head);
+    bytes += (own.worn.capacity() + own.slid.capacity() + own.crept.capacity()) * sizeof(Worn);
+  }
+  return bytes;
+}
+
+int BondCohesive::pack_forward_comm(int n, int *atoms, double *buf, int, int *)
+{
+  for (int k = 0; k < n; k++) buf[k] = theta[atoms[k]];
+  return n;
+}
+
+void BondCohesive::unpack_forward_comm(int n, int first, double *buf)
+{
+  std::copy(buf, buf + n, theta + first);
+}
+
+int BondCohesive::pack_reverse_comm(int n, int first, double *buf)
+{
+  std::copy(torque + first, torque + first + n, buf);
+  return n;
+}
+
+void BondCohesive::unpack_reverse_comm(int n, int *atoms, double *buf)
+{
+  for (int k = 0; k < n; k++) torque[atoms[k]] += buf[k];
 }

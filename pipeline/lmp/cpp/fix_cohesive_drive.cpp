@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
@@ -27,10 +28,15 @@ static constexpr double SAFETY = 0.9;
 static constexpr double HASTE = 10.0;
 // the load is off by up to about twice the lag (measured against the equilibrium engine)
 static constexpr double ERROR_PER_LAG = 2.0;
-static constexpr int NVECTOR = 15;
+static constexpr int NVECTOR = 16;
+// per-particle means kept: velocity x and y, rotation
+static constexpr int NMEAN = 3;
+// what sliding and turning of a bond's ends are bounded by: (a + b)² <= SLIDE a² + TURN b²
+static constexpr double SLIDE = 1.25, TURN = 5.0;
 
 FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
-    Fix(lmp, narg, arg), state{}, window{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr)
+    Fix(lmp, narg, arg), state{}, window{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr), turning(nullptr),
+    theta(nullptr), omega_z(nullptr), torque(nullptr), inertia(nullptr)
 {
   nevery = 20;
   omega = lag_wanted = cmod_max = first_load = first_rate = lowest_rate = highest_rate = 0.0;
@@ -43,7 +49,7 @@ FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
   time_integrate = 1;
   restart_global = 1;
   restart_peratom = 1;
-  comm_reverse = 3;
+  comm_reverse = 4;
   state.rate = first_rate;
   state.frame_due = 1.0;
   state.next_frame = stations.empty() ? INFINITY : stations.front();
@@ -51,8 +57,10 @@ FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
   FixCohesiveDrive::grow_arrays(atom->nmax);
   atom->add_callback(Atom::GROW);
   atom->add_callback(Atom::RESTART);
-  for (int i = 0; i < atom->nlocal; i++)
+  for (int i = 0; i < atom->nlocal; i++) {
     for (int k = 0; k < 2; k++) mean_v[i][k] = atom->v[i][k];
+    mean_v[i][2] = 0.0;
+  }
 }
 
 FixCohesiveDrive::~FixCohesiveDrive()
@@ -61,6 +69,7 @@ FixCohesiveDrive::~FixCohesiveDrive()
   atom->delete_callback(id, Atom::RESTART);
   memory->destroy(mean_v);
   memory->destroy(stiffness);
+  memory->destroy(turning);
 }
 
 // grip WEIGHTS DX DY DRIVE drive|react|guide
@@ -115,6 +124,15 @@ void FixCohesiveDrive::parse(int narg, char **arg)
       need(n + 1);
       for (int i = 0; i < n; i++) stations.push_back(utils::numeric(FLERR, arg[k + 2 + i], false, lmp));
       k += n + 2;
+    } else if (strcmp(arg[k], "clock") == 0) {
+      need(1);
+      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+      need(2 * n + 1);
+      for (int i = 0; i < n; i++) {
+        clock_cmod.push_back(utils::numeric(FLERR, arg[k + 2 + 2 * i], false, lmp));
+        clock_time.push_back(utils::numeric(FLERR, arg[k + 3 + 2 * i], false, lmp));
+      }
+      k += 2 * n + 2;
     } else if (strcmp(arg[k], "rate") == 0) {
       need(3);
       first_rate = utils::numeric(FLERR, arg[k + 1], false, lmp);
@@ -141,6 +159,10 @@ void FixCohesiveDrive::parse(int narg, char **arg)
   if (!(lowest_rate > 0.0 && lowest_rate <= first_rate && first_rate <= highest_rate))
     error->all(FLERR, "rates {:g} {:g} {:g} must be positive, and the first between lowest and highest", first_rate,
                lowest_rate, highest_rate);
+  for (const auto *values : {&clock_cmod, &clock_time})
+    if (!values->empty() && (values->size() < 2 || values->front() != 0.0 ||
+                             std::adjacent_find(values->begin(), values->end(), std::greater_equal<>()) != values->end()))
+      error->all(FLERR, "the openings and times of a clock must be two or more values that increase from 0");
   if (nevery < 1) error->all(FLERR, "record = {} must be positive", nevery);
 }
 
@@ -155,7 +177,21 @@ void FixCohesiveDrive::init()
   if (!bond) error->all(FLERR, "fix cohesive/drive needs bond_style cohesive");
   if (!atom->rmass_flag || !atom->rmass)
     error->all(FLERR, "fix cohesive/drive needs a mass for each particle: use 'fix property/atom rmass'");
+  if (bond->creeps()) {
+    if (clock_cmod.empty())
+      error->all(FLERR, "bonds that creep need the time of the test: give fix cohesive/drive a 'clock'");
+    bond->set_time(state.time);
+  }
   built_calls = -1;
+}
+
+void FixCohesiveDrive::find_rotation()
+{
+  if (!bond->slides()) return;
+  theta = bond->rotation("theta");
+  omega_z = bond->rotation("omega");
+  torque = bond->rotation("torque");
+  inertia = bond->rotation("inertia");
 }
 
 double *FixCohesiveDrive::weights(const std::string &name) const
@@ -168,14 +204,17 @@ double *FixCohesiveDrive::weights(const std::string &name) const
 }
 
 // fictitious masses: the same highest frequency around every particle, its bound being
-// omega² <= 2 max eigenvalue of (sum of k_n n⊗n) / m
+// omega² <= 2 max eigenvalue of (sum of k_n n⊗n + SLIDE k_s s⊗s) / m, and of TURN (sum of k_s r²) / I
 void FixCohesiveDrive::assign_masses()
 {
   memory->destroy(stiffness);
-  const int nall = atom->nlocal + atom->nghost;
-  memory->create(stiffness, std::max(nall, 1), 3, "cohesive/drive:stiffness");
-  for (int i = 0; i < nall; i++) stiffness[i][0] = stiffness[i][1] = stiffness[i][2] = 0.0;
-  bond->add_stiffness(stiffness);
+  memory->destroy(turning);
+  const int nall = std::max(atom->nlocal + atom->nghost, 1);
+  memory->create(stiffness, nall, 3, "cohesive/drive:stiffness");
+  memory->create(turning, nall, 1, "cohesive/drive:turning");
+  std::fill(stiffness[0], stiffness[0] + 3 * nall, 0.0);
+  std::fill(turning[0], turning[0] + nall, 0.0);
+  bond->add_stiffness(stiffness, turning, SLIDE);
   if (force->newton_bond) comm->reverse_comm(this);
   const double scale = update->dt * update->dt / (2.0 * SAFETY * SAFETY);
   for (int i = 0; i < atom->nlocal; i++) {
@@ -183,29 +222,37 @@ void FixCohesiveDrive::assign_masses()
     const double largest = half + std::hypot(0.5 * (stiffness[i][0] - stiffness[i][1]), stiffness[i][2]);
     if (!(largest > 0.0)) error->one(FLERR, "particle {} has no cohesive bond", atom->tag[i]);
     atom->rmass[i] = scale * largest;
+    if (bond->slides()) inertia[i] = turning[i][0] > 0.0 ? scale * TURN * turning[i][0] : atom->rmass[i];
   }
 }
 
 int FixCohesiveDrive::pack_reverse_comm(int n, int first, double *buf)
 {
   int m = 0;
-  for (int i = first; i < first + n; i++)
+  for (int i = first; i < first + n; i++) {
     for (int k = 0; k < 3; k++) buf[m++] = stiffness[i][k];
+    buf[m++] = turning[i][0];
+  }
   return m;
 }
 
 void FixCohesiveDrive::unpack_reverse_comm(int n, int *atoms, double *buf)
 {
   int m = 0;
-  for (int i = 0; i < n; i++)
+  for (int i = 0; i < n; i++) {
     for (int k = 0; k < 3; k++) stiffness[atoms[i]][k] += buf[m++];
+    turning[atoms[i]][0] += buf[m++];
+  }
 }
 
 void FixCohesiveDrive::setup(int)
 {
+  find_rotation();
   assign_masses();
   build_lists();
   if (state.started == 0.0) {
+    if (bond->slides())
+      for (int i = 0; i < atom->nlocal; i++) mean_v[i][2] = omega_z[i];
     double sum = gauge_sum();
     MPI_Allreduce(&sum, &state.cmod_zero, 1, MPI_DOUBLE, MPI_SUM, world);
     state.peak = first_load;    // the specimen starts at the machine's speed: that energy came from the machine
@@ -241,6 +288,12 @@ void FixCohesiveDrive::build_lists()
     if (!(grip.mobility > 0.0)) error->all(FLERR, "no particle has a weight in d_{}", grip.weights);
   }
   const double *weight = weights(gauge);
+  for (auto &grip : grips) {
+    double sum = 0.0;
+    for (size_t k = 0; k < grip.atom.size(); k++)
+      sum += weight[grip.atom[k]] * grip.weight[k] * grip.dx / atom->rmass[grip.atom[k]];
+    MPI_Allreduce(&sum, &grip.gauge, 1, MPI_DOUBLE, MPI_SUM, world);
+  }
   gauge_atom.clear();
   gauge_weight.clear();
   for (int i = 0; i < atom->nlocal; i++) {
@@ -282,8 +335,37 @@ double FixCohesiveDrive::advance(double dt)
   return lost;
 }
 
+// the same for rotations
+double FixCohesiveDrive::advance_rotation(double dt)
+{
+  const double c = damping_rate * dt, keep = 1.0 / (1.0 + c), follow = mean_rate * dt;
+  double lost = 0.0;
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double before = omega_z[i], mean = mean_v[i][2];
+    const double after = keep * (before + dt / inertia[i] * torque[i] + c * mean);
+    lost += 0.5 * c * inertia[i] * (after - mean) * (before + after);
+    omega_z[i] = after;
+    theta[i] += dt * after;
+    mean_v[i][2] = mean + follow * (after - mean);
+  }
+  return lost;
+}
+
+// physical time: when the gauge of the test was as wide open as it ever was here
+void FixCohesiveDrive::read_clock(double widest)
+{
+  if (!(widest > state.widest)) return;
+  state.widest = widest;
+  const auto after = std::lower_bound(clock_cmod.begin() + 1, clock_cmod.end() - 1, widest);
+  const size_t k = after - clock_cmod.begin();
+  const double rate = (clock_time[k] - clock_time[k - 1]) / (clock_cmod[k] - clock_cmod[k - 1]);
+  state.time = clock_time[k - 1] + rate * (widest - clock_cmod[k - 1]);
+  bond->set_time(state.time);
+}
+
 void FixCohesiveDrive::initial_integrate(int)
 {
+  find_rotation();
   if (lists_are_old()) build_lists();
   const double dt = update->dt;
   window.steps += 1.0;
@@ -299,9 +381,11 @@ void FixCohesiveDrive::initial_integrate(int)
         before.push_back(mean_v[i][k]);
       }
   double lost = advance(dt);
+  if (bond->slides()) lost += advance_rotation(dt);
 
   // one reaction a grip, from the mean velocity that is missing
-  std::vector<double> local(grips.size()), missing(grips.size());
+  const bool timed = bond->creeps();
+  std::vector<double> local(grips.size() + 1), missing(grips.size() + 1);
   for (size_t g = 0; g < grips.size(); g++) {
     const auto &grip = grips[g];
     for (size_t k = 0; k < grip.atom.size(); k++) {
@@ -309,7 +393,9 @@ void FixCohesiveDrive::initial_integrate(int)
       local[g] += grip.weight[k] * (grip.dx * v[0] + grip.dy * v[1]);
     }
   }
-  MPI_Allreduce(local.data(), missing.data(), static_cast<int>(grips.size()), MPI_DOUBLE, MPI_SUM, world);
+  if (timed) local.back() = gauge_sum();
+  MPI_Allreduce(local.data(), missing.data(), static_cast<int>(local.size()), MPI_DOUBLE, MPI_SUM, world);
+  double cmod = missing.back() - state.cmod_zero;
 
   const double c = damping_rate * dt, follow = mean_rate * dt;
   size_t at = 0;
@@ -318,6 +404,7 @@ void FixCohesiveDrive::initial_integrate(int)
     auto &grip = grips[g];
     const double impulse = (grip.drive * state.rate - missing[g]) / grip.mobility;
     grip.reaction = impulse * (1.0 + c) / dt;
+    cmod += dt * impulse * grip.gauge;
     for (size_t k = 0; k < grip.atom.size(); k++) {
       const int i = grip.atom[k];
       const double direction[2] = {grip.dx, grip.dy};
@@ -339,6 +426,7 @@ void FixCohesiveDrive::initial_integrate(int)
   window.react += react;
   state.load_line += state.rate * dt;
   damping_now += lost;
+  if (timed) read_clock(cmod);
 }
 
 double FixCohesiveDrive::kinetic_energy() const
@@ -346,6 +434,8 @@ double FixCohesiveDrive::kinetic_energy() const
   double sum = 0.0;
   for (int i = 0; i < atom->nlocal; i++)
     sum += 0.5 * atom->rmass[i] * (atom->v[i][0] * atom->v[i][0] + atom->v[i][1] * atom->v[i][1]);
+  if (bond->slides())
+    for (int i = 0; i < atom->nlocal; i++) sum += 0.5 * inertia[i] * omega_z[i] * omega_z[i];
   return sum;
 }
 
@@ -419,6 +509,11 @@ void FixCohesiveDrive::choose_rate()
       atom->v[i][k] *= factor;
       mean_v[i][k] *= factor;
     }
+  if (bond->slides())
+    for (int i = 0; i < atom->nlocal; i++) {
+      omega_z[i] *= factor;
+      mean_v[i][2] *= factor;
+    }
   const double before = state.kinetic;
   state.kinetic *= factor * factor;
   state.damping += before - state.kinetic;
@@ -442,40 +537,41 @@ double FixCohesiveDrive::compute_vector(int k)
     case 11: return state.error_weight > 0.0 ? ERROR_PER_LAG * std::sqrt(state.error_sum / state.error_weight) : 0.0;
     case 12: return state.frame_due;
     case 13: return state.cmod >= cmod_max ? 1.0 : 0.0;
+    case 15: return state.time;
     default: return state.lag;
   }
 }
 
 double FixCohesiveDrive::memory_usage()
 {
-  return 2.0 * atom->nmax * sizeof(double);
+  return NMEAN * atom->nmax * sizeof(double);
 }
 
 void FixCohesiveDrive::grow_arrays(int nmax)
 {
-  memory->grow(mean_v, nmax, 2, "cohesive/drive:mean_v");
+  memory->grow(mean_v, nmax, NMEAN, "cohesive/drive:mean_v");
 }
 
 void FixCohesiveDrive::copy_arrays(int i, int j, int)
 {
-  for (int k = 0; k < 2; k++) mean_v[j][k] = mean_v[i][k];
+  for (int k = 0; k < NMEAN; k++) mean_v[j][k] = mean_v[i][k];
 }
 
 int FixCohesiveDrive::pack_exchange(int i, double *buf)
 {
-  for (int k = 0; k < 2; k++) buf[k] = mean_v[i][k];
-  return 2;
+  for (int k = 0; k < NMEAN; k++) buf[k] = mean_v[i][k];
+  return NMEAN;
 }
 
 int FixCohesiveDrive::unpack_exchange(int nlocal, double *buf)
 {
-  for (int k = 0; k < 2; k++) mean_v[nlocal][k] = buf[k];
-  return 2;
+  for (int k = 0; k < NMEAN; k++) mean_v[nlocal][k] = buf[k];
+  return NMEAN;
 }
 
 int FixCohesiveDrive::pack_restart(int i, double *buf)
 {
-  buf[0] = 3;
+  buf[0] = NMEAN + 1;
   return 1 + pack_exchange(i, buf + 1);
 }
 
@@ -484,17 +580,17 @@ void FixCohesiveDrive::unpack_restart(int nlocal, int nth)
   double **extra = atom->extra;
   int m = 0;
   for (int i = 0; i < nth; i++) m += static_cast<int>(extra[nlocal][m]);
-  for (int k = 0; k < 2; k++) mean_v[nlocal][k] = extra[nlocal][m + 1 + k];
+  for (int k = 0; k < NMEAN; k++) mean_v[nlocal][k] = extra[nlocal][m + 1 + k];
 }
 
 int FixCohesiveDrive::size_restart(int)
 {
-  return 3;
+  return NMEAN + 1;
 }
 
 int FixCohesiveDrive::maxsize_restart()
 {
-  return 3;
+  return NMEAN + 1;
 }
 
 void FixCohesiveDrive::write_restart(FILE *fp)

@@ -54,6 +54,7 @@ class FixCohesiveDrive : public Fix {
     std::vector<int> atom;
     std::vector<double> weight;
     double mobility;    // sum of weight² / mass, all ranks
+    double gauge;       // what a unit impulse adds to the speed of the gauge
     double reaction;
   };
 
@@ -64,6 +65,7 @@ class FixCohesiveDrive : public Fix {
     double peak, lag, error_sum, error_weight;
     double cmod, load, load_line_mean, load_drive, load_react, stored, dissipated, kinetic;
     double next_frame, frame_due, last_cmod;
+    double widest, time;    // largest CMOD, and the time at which the test was there
   } state;
 
   // sums over the steps since the last record
@@ -76,10 +78,12 @@ class FixCohesiveDrive : public Fix {
   double *weights(const std::string &) const;
   void assign_masses();
   void build_lists();
+  void read_clock(double widest);
   bool lists_are_old() const;
   double gauge_sum() const;
-  double advance(double factor);
-  void grip_velocities();
+  double advance(double dt);
+  double advance_rotation(double dt);
+  void find_rotation();
   void record();
   void measure_lag();
   void choose_rate();
@@ -95,8 +99,10 @@ class FixCohesiveDrive : public Fix {
   double omega, lag_wanted, cmod_max, first_load, first_rate, lowest_rate, highest_rate;
   double damping_rate, mean_rate;
   std::vector<double> stations;
-  double **mean_v;           // running mean of the velocity, x and y
-  double **stiffness;        // scratch of assign_masses
+  std::vector<double> clock_cmod, clock_time;    // t(CMOD) of the test, for bonds that creep
+  double **mean_v;                               // running mean of the velocity: x, y, and of the rotation
+  double **stiffness, **turning;                 // scratch of assign_masses
+  double *theta, *omega_z, *torque, *inertia;    // rotations of the particles, or null
   double damping_now;
   bigint built_calls, built_step;
 };

@@ -1,0 +1,148 @@
+"""What bonds remember from step to step, whatever their law: forces out of openings, and energies out of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.core.errors import UnavailableError
+from pipeline.core.problem import BondLaw
+from pipeline.materials.cohesive import CentralSoftening
+from pipeline.materials.creeping_softening import BondState, CreepingSoftening
+from pipeline.materials.mixed_softening import MixedSoftening, MixedState
+
+
+class Memory(Protocol):
+    """The bonds at one step; arrays (m,), one entry a bond.
+
+    `follow` brings them to openings and slidings, m, within `duration` s of the test; `tension` and `shear` are their
+    forces there, N, `stored` and `used` their energies, J, `reached` the largest opening in m, or its like.
+    """
+
+    @property
+    def opening(self) -> np.ndarray: ...
+    @property
+    def tension(self) -> np.ndarray: ...
+    @property
+    def shear(self) -> np.ndarray: ...
+    @property
+    def stored(self) -> np.ndarray: ...
+    @property
+    def used(self) -> np.ndarray: ...
+    @property
+    def reached(self) -> np.ndarray: ...
+    def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> Memory: ...
+
+
+@dataclass(frozen=True)
+class CentralMemory:
+    """Bonds that only open."""
+
+    law: CentralSoftening
+    opening: np.ndarray
+    reached: np.ndarray
+
+    @property
+    def tension(self) -> np.ndarray:
+        return self.law.force(self.opening, self.reached)
+
+    @property
+    def shear(self) -> np.ndarray:
+        return np.zeros_like(self.opening)
+
+    @property
+    def stored(self) -> np.ndarray:
+        return self.law.stored(self.opening, self.reached)
+
+    @property
+    def used(self) -> np.ndarray:
+        return self.law.dissipated(self.reached)
+
+    def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> CentralMemory:
+        return replace(self, opening=opening, reached=np.maximum(opening, self.reached))
+
+
+@dataclass(frozen=True)
+class MixedMemory:
+    """Bonds that open and slide."""
+
+    law: MixedSoftening
+    opening: np.ndarray
+    sliding: np.ndarray
+    state: MixedState
+
+    @property
+    def tension(self) -> np.ndarray:
+        return self.law.forces(self.state, self.opening, self.sliding)[0]
+
+    @property
+    def shear(self) -> np.ndarray:
+        return self.law.forces(self.state, self.opening, self.sliding)[1]
+
+    @property
+    def stored(self) -> np.ndarray:
+        return self.law.stored(self.state, self.opening, self.sliding)
+
+    @property
+    def used(self) -> np.ndarray:
+        return self.state.used
+
+    @property
+    def reached(self) -> np.ndarray:
+        return self.law.reached(self.state)
+
+    def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> MixedMemory:
+        return replace(self, opening=opening, sliding=sliding, state=self.law.advance(self.state, opening, sliding))
+
+
+@dataclass(frozen=True)
+class CreepingMemory:
+    """Bonds that creep."""
+
+    law: CreepingSoftening
+    state: BondState
+    used: np.ndarray
+
+    @property
+    def opening(self) -> np.ndarray:
+        return self.state.opening
+
+    @property
+    def tension(self) -> np.ndarray:
+        return self.law.force(self.state, self.opening, 0.0)
+
+    @property
+    def shear(self) -> np.ndarray:
+        return np.zeros_like(self.used)
+
+    @property
+    def stored(self) -> np.ndarray:
+        return self.law.stored(self.state)
+
+    @property
+    def reached(self) -> np.ndarray:
+        return self.law.equivalent(self.state)
+
+    def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> CreepingMemory:
+        after = self.law.advance(self.state, opening, duration)
+        return replace(self, state=after, used=self.used + self.law.used(self.state, after, duration))
+
+
+def at_rest(law: BondLaw) -> Memory:
+    """Bonds that were never loaded.
+
+    Raises
+    ------
+    UnavailableError
+        for a law that this engine does not follow
+    """
+    zero = np.zeros(law.k_n.size)
+    if isinstance(law, CentralSoftening):
+        return CentralMemory(law, zero, zero)
+    if isinstance(law, MixedSoftening):
+        return MixedMemory(law, zero, zero, law.at_rest())
+    if isinstance(law, CreepingSoftening):
+        return CreepingMemory(law, law.at_rest(), zero)
+    raise UnavailableError(f"the engine reference does not follow the law {type(law).__name__}")
