@@ -32,6 +32,7 @@ from pipeline.options import (
     Frames,
     Geometry,
     Grid,
+    LawChoice,
     LoadNoise,
     NoiseGrey,
     NoisePx,
@@ -157,7 +158,7 @@ def simulate(
     engine: EngineChoice = None,
     radius_mm: Radius = None,
     accuracy: Accuracy = None,
-    law: Annotated[str | None, option("--law", metavar="NAME", help="Softening instead of the bundle's.")] = None,
+    law: LawChoice = None,
     effect: Effect = None,
     config: Config = None,
     workers: Workers = None,
@@ -168,7 +169,6 @@ def simulate(
     """Simulate one fracture test."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(law=law)
             from pipeline.study.simulate import simulate as run
 
             summary = run(
@@ -181,6 +181,7 @@ def simulate(
                 accuracy=accuracy,
                 effect=effect,
                 ranks=ranks,
+                law=law,
                 config=config,
                 progress=progress,
             )

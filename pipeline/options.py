@@ -164,6 +164,10 @@ Radius = Annotated[
     ),
 ]
 # what is left out here has the value of --config, or else the default of the settings
+Law = Literal["linear", "exponential", "bilinear-tail", "burgers"]
+LawChoice = Annotated[
+    Law | None, option("--law", help="Softening instead of the bundle's; burgers: the mastic creeps (creep.csv).")
+]
 EngineChoice = Annotated[Engine | None, option("--engine", help="What simulates (default: lammps).")]
 Accuracy = Annotated[
     float | None,

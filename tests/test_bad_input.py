@@ -248,11 +248,11 @@ def test_other_commands_refuse_alike(bundle, command, case):
 
 
 def test_all_that_is_wrong_is_listed_at_once(bundle):
-    """Also what only the image's content and this version's limits forbid."""
+    """Also what only the image's content forbids."""
     row_8(cmod="nan")(bundle)
     photograph(NOISE)(bundle)
-    edit(bundle, softening='"exponential"')
-    told = ("row 8: cmod_mm is nan", "no aggregate can be told", "softening = 'exponential'")
+    edit(bundle, shear_strength_ratio="0.5")
+    told = ("row 8: cmod_mm is nan", "no aggregate can be told", "shear_strength_ratio = 0.5 cannot be identified")
     assert_refused(bundle.parent, lines("check", bundle), *told)
 
 

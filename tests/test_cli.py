@@ -149,7 +149,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
     ("line", "option"),
     [
         (COMMANDS["identify"], ["--viscoelastic"]),
-        (COMMANDS["simulate"], ["--law", "exponential"]),
         (COMMANDS["virtual_test"], ["--creep", "creep.csv"]),
     ],
 )

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.config import RunSettings, load_settings, run_settings
-from pipeline.core.errors import InputError, UnavailableError
+from pipeline.core.clock import Clock, steady
+from pipeline.core.errors import InputError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Problem
 from pipeline.core.units import GPA
-from pipeline.materials.elastic import central_force_stiffness
+from pipeline.materials.creeping_mixture import creeping_law
 from pipeline.materials.mixture import Mixture
+from pipeline.materials.softening import Shape, Softening, Unloading, named_shape
 from pipeline.microstructure.attachment import attach_gauge, attach_grips, gauge_remark
 from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
@@ -27,6 +29,7 @@ from pipeline.store.images import read_grey, read_labels
 from pipeline.store.start import start_parameters
 from pipeline.study.creep_analysis import mastic_creep
 
+CREEPING = "burgers"  # the name of the law whose mastic creeps
 PRE_PEAK = (0.25, 0.5, 0.75)  # of the CMOD at peak: frames kept for the diagnosis
 
 
@@ -70,6 +73,7 @@ class Model:
         frames: np.ndarray | None = None,
         cmod_max: float | None = None,
         accuracy: float = 0.01,
+        law: str | None = None,
     ) -> Problem:
         """The fracture test at one pair of parameters.
 
@@ -80,14 +84,21 @@ class Model:
         frames : (k,) array, m; CMOD of the full fields, those of `frame_stations` by default
         cmod_max : float, m; end of the test, the bundle's by default
         accuracy : float; quasi-static error asked for
+        law : str; a shape of softening instead of the bundle's, or "burgers": the mastic creeps as creep.csv says
         """
+        creeps = law == CREEPING
+        shape = self.mixture.softening if law is None or creeps else Softening(named_shape(law))
+        mixture = replace(self.mixture, softening=shape)
+        properties = self.bonds, self.bundle.specimen.thickness, f_max * self.force_scale, delta_max
         end = self.bundle.cmod_max if cmod_max is None else cmod_max
         wanted = frame_stations(self.bundle) if frames is None else frames
         return Problem(
             specimen=self.bundle.specimen,
             particles=self.particles,
             bonds=self.bonds,
-            law=self.mixture.law(self.bonds, self.bundle.specimen.thickness, f_max * self.force_scale, delta_max),
+            law=creeping_law(mixture, mastic_creep(self.bundle).burgers, *properties)
+            if creeps
+            else mixture.law(*properties),
             grips=self.grips,
             gauge=self.gauge,
             kinematics=self.bundle.model.motion,
@@ -95,6 +106,7 @@ class Model:
             stations=wanted[wanted <= end],
             accuracy=accuracy,
             cmod_rate=self.bundle.loading.cmod_rate,
+            clock=test_clock(self.bundle) if creeps else None,
         )
 
     def placed(self, shift: tuple[float, float]) -> Model:
@@ -199,18 +211,16 @@ def mixture(bundle: Bundle, radius: float | None = None) -> Mixture:
         aggregate_opening_ratio=material.aggregate_opening_ratio,
         aggregate_follows=material.aggregate_follows,
         touching=material.touching,
+        shear_strength_ratio=material.shear_strength_ratio,
+        shear_opening_ratio=material.shear_opening_ratio,
+        softening=Softening(Shape(material.softening)),
+        unloading=Unloading(material.unloading),
     )
 
 
 def refuse_untold(bundle: Bundle) -> None:
-    """Refuse what the bundle asks for and this version cannot do, or nobody could."""
+    """Refuse what nobody could tell from a test."""
     material = bundle.material
-    if material.softening != "linear" or material.unloading != "secant":
-        raise UnavailableError(
-            f"softening = {material.softening!r} with unloading = {material.unloading!r} is not in this version: "
-            "use linear and secant"
-        )
-    central_force_stiffness(1.0, material.poissons_ratio, material.plane_state, 1.0)  # refuses K^s > 0
     ratio = material.plane_state.central_force_ratio
     shear = (material.shear_strength_ratio, material.shear_opening_ratio)
     if shear != (1.0, 1.0) and abs(material.poissons_ratio - ratio) < 1e-3:
@@ -218,6 +228,16 @@ def refuse_untold(bundle: Bundle) -> None:
             f"shear_strength_ratio and shear_opening_ratio = {shear} cannot be identified: at poissons_ratio = "
             f"{material.poissons_ratio:g} bonds carry no shear (K^s = 0); leave them at 1"
         )
+
+
+def test_clock(bundle: Bundle) -> Clock:
+    """Time of the test against its CMOD: of the record where there is one, else at the rate that was set."""
+    if bundle.curve is None:
+        return steady(bundle.loading.cmod_rate)
+    cmod, time = bundle.curve.cmod, bundle.curve.time
+    opened = np.flatnonzero(cmod > np.maximum.accumulate(np.concatenate([[0.0], cmod[:-1]])))
+    after = opened[time[opened] > time[0]]
+    return Clock(np.concatenate([[0.0], cmod[after]]), np.concatenate([[0.0], time[after] - time[0]]))
 
 
 def frame_stations(bundle: Bundle) -> np.ndarray:

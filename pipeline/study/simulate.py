@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import InputError
 from pipeline.core.particles import Phase
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen, ligament_area
@@ -41,6 +42,7 @@ def simulate(
     accuracy: float | None = None,
     ranks: int | None = None,
     effect: Sequence[tuple[str, float]] | None = None,
+    law: str | None = None,
     config: Path | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -52,6 +54,7 @@ def simulate(
     f_max : float, N, per bond of the bundle's lattice
     delta_max : float, m
     effect : (name, value) pairs of physics effects; what the model leaves out
+    law : a shape of softening instead of the bundle's, or "burgers": the mastic creeps as creep.csv says
     engine, radius_mm, accuracy, ranks : override the settings of `config`
     """
     wanted = physics_effects(effect)
@@ -60,8 +63,10 @@ def simulate(
     read = read_bundle(bundle)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)
-    problem = model.problem(f_max, delta_max, accuracy=settings.accuracy)
+    problem = model.problem(f_max, delta_max, accuracy=settings.accuracy, law=law)
     if wanted:
+        if law is not None:
+            raise InputError(f"--law {law} and --effect cannot be asked for together: give one of them")
         plan = planned(read.specimen, model.mixture, wanted)
         problem = lattice_problem(model, plan, problem, f_max, delta_max)
     store = SimulationStore(prepare_output(folder / "simulations"))

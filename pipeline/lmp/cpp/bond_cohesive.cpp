@@ -250,6 +250,21 @@ void BondCohesive::keep(const Worn &bond, const double *row)
   if (bond.mirror_slot >= 0) write(history(bond.second, bond.mirror_slot));
 }
 
+std::vector<double> BondCohesive::rows() const
+{
+  std::vector<double> table;
+  for (int i = 0; i < atom->nlocal; i++)
+    for (int m = 0; m < atom->num_bond[i]; m++) {
+      const int type = atom->bond_type[i][m];
+      const tagint own = atom->tag[i], other = atom->bond_atom[i][m];
+      if (type <= 0 || !setflag[type] || (!force->newton_bond && own > other)) continue;
+      table.push_back(static_cast<double>(own));
+      table.push_back(static_cast<double>(other));
+      table.insert(table.end(), history(i, m), history(i, m) + nhistory);
+    }
+  return table;
+}
+
 bool BondCohesive::read_history(tagint first, tagint second, const double *row)
 {
   bool found = false;

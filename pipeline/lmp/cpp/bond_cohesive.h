@@ -51,6 +51,7 @@ class BondCohesive : public Bond {
   void add_stiffness(double **opening, double **turning, double share_of_sliding);
   double *rotation(const char *name) const;                // theta, omega, torque or inertia of the particles
   int columns() const { return nhistory; }
+  std::vector<double> rows() const;    // id1 id2 and the history of every bond, once over all ranks
   bool read_history(tagint first, tagint second, const double *row);    // false where this rank does not keep it
   void forget_lists() { built_calls = -1; }
 

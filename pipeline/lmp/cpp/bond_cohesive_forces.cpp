@@ -36,7 +36,7 @@ inline double angle(double cross, double dot)
 {
   const double t = cross / dot, q = t * t;
   if (!(dot > 0.0 && q < 2.5e-3)) return std::atan2(cross, dot);
-  return t * (1.0 + q * (-1.0 / 3 + q * (1.0 / 5 + q * (-1.0 / 7 + q * (1.0 / 9 - q / 11)))));
+  return t * (1.0 + q * (-1.0 / 3 + q * (1.0 / 5 + q * (-1.0 / 7 + q * (1.0 / 9 - q * (1.0 / 11))))));
 }
 
 // by how much a bond has turned more than its ends: nearest to none
