@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -54,6 +54,16 @@ class CohesiveLaw(BondLaw, Protocol):
 
     def force(self, opening: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
     def stored(self, opening: np.ndarray, reached: np.ndarray) -> np.ndarray: ...
+
+
+@runtime_checkable
+class SlidingLaw(BondLaw, Protocol):
+    """A law of bonds that resist sliding too, and so turn their particles; k_s in N/m, f_shear in N."""
+
+    @property
+    def k_s(self) -> np.ndarray: ...
+    @property
+    def f_shear(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.problem import Problem
+from pipeline.core.problem import Problem, SlidingLaw
 from pipeline.explicit.modes import Modes
-from pipeline.materials.mixed_softening import MixedSoftening
 
 PERIODS = 40
 LAG = 0.5
@@ -71,7 +70,7 @@ def first_damage_load(problem: Problem, modes: Modes) -> float:
     length, direction = problem.bonds.reference(problem.particles.position)
     moved = modes.response[second] - modes.response[first]
     usage = np.maximum(np.sum(moved * direction, axis=1), 0.0) / problem.law.delta_peak
-    if isinstance(problem.law, MixedSoftening):
+    if isinstance(problem.law, SlidingLaw):
         across = moved[:, 1] * direction[:, 0] - moved[:, 0] * direction[:, 1]
         sliding = across - length / 2 * (modes.rotation[first] + modes.rotation[second])
         usage = np.hypot(usage, problem.law.k_s * sliding / problem.law.f_shear)

@@ -8,8 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from pipeline.core.problem import Grip, Problem, Role
-from pipeline.materials.mixed_softening import MixedSoftening
+from pipeline.core.problem import Grip, Problem, Role, SlidingLaw
 
 SAFETY = 0.9  # of the largest stable time step, as in fix_cohesive_drive.cpp
 SLIDE, TURN = 1.25, 5.0  # (a + b)² ≤ SLIDE a² + TURN b²: sliding and turning of a bond's ends, as there
@@ -37,7 +36,7 @@ class Modes:
 
 def shear_stiffness(problem: Problem) -> np.ndarray | None:
     """K^s (m,), N/m, of bonds that slide; None where none do, and particles do not rotate."""
-    return problem.law.k_s if isinstance(problem.law, MixedSoftening) else None
+    return problem.law.k_s if isinstance(problem.law, SlidingLaw) else None
 
 
 def stiffness_matrix(problem: Problem) -> sparse.csc_matrix:
