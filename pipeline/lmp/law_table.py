@@ -24,11 +24,13 @@ class LawTable:
 
     Parameters
     ----------
+    rows : (types, 3) array; k_n (N/m), f_max (N; inf takes no damage), delta_max (m)
     coefficients : (types,) list of str; what follows `bond_coeff TYPE`
     type : (m,) int array, 0-based
     name : (types,) list of str; the phases that use a row
     """
 
+    rows: np.ndarray
     coefficients: list[str]
     type: np.ndarray
     name: list[str]
@@ -40,7 +42,7 @@ def law_table(problem: Problem) -> LawTable:
     rows, first, index = np.unique(_numbers(law), axis=0, return_index=True, return_inverse=True)
     index = index.reshape(-1)
     names = [_name(problem.bonds.phase[index == k]) for k in range(len(rows))]
-    return LawTable([coefficients(law, int(k)) for k in first], index, names)
+    return LawTable(rows[:, :3], [coefficients(law, int(k)) for k in first], index, names)
 
 
 def supported(law: BondLaw) -> Law:
