@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import InputError
-from pipeline.core.problem import EnergyBalance, Kinematics, Problem, Solution
+from pipeline.core.problem import BondLaw, EnergyBalance, Kinematics, Problem, Solution
 from pipeline.materials.cohesive import LinearSoftening
 
 
@@ -70,3 +70,49 @@ def scaling_groups(nodes: list[tuple[float, float]]) -> list[list[tuple[int, flo
         groups.setdefault(known, []).append(number)
     ordered = [sorted(group, key=lambda k: -nodes[k][0]) for group in groups.values()]
     return [[(k, nodes[k][0] / nodes[group[0]][0]) for k in group] for group in ordered]
+
+
+def leading_problem(problem: Problem, factors: list[float]) -> Problem:
+    """The problem to simulate so that its scaled solutions reach the end and the stations of `problem`.
+
+    Parameters
+    ----------
+    problem : Problem with the law of the group's first node
+    factors : of all nodes of the group, from `scaling_groups`: the first is 1
+    """
+    stations = np.unique(np.concatenate([problem.stations / factor for factor in factors]))
+    distinct = np.append(True, np.diff(stations) > 1e-9 * stations[-1])
+    return replace(problem, cmod_max=problem.cmod_max / min(factors), stations=stations[distinct])
+
+
+def member_solution(lead: Solution, leading: Problem, target: Problem, factor: float) -> Solution | None:
+    """The solution of `target` from that of `leading`, of strengths and openings 1/factor as large.
+
+    Where bonds of the target do not follow the scaling (an aggregate that keeps its strength), the solution is
+    exact all the same as long as none of them is damaged in either; that is looked at.
+
+    Returns
+    -------
+    Solution up to the last CMOD of `target`, fields at its stations; None where it would not be exact, or too short
+    """
+    scaled = scaled_problem(leading, factor)
+    solution = scaled_solution(lead, leading, factor)
+    if not _untouched(scaled.law, target.law, solution.reached) or solution.curve.cmod[-1] < 0.999 * target.cmod_max:
+        return None
+    frames = [int(np.argmin(np.abs(solution.cmod - station))) for station in target.stations]
+    if not np.allclose(solution.cmod[frames], target.stations, rtol=1e-6, atol=0):
+        return None
+    return replace(solution, cmod=target.stations, displacement=solution.displacement[frames])
+
+
+def _untouched(scaled: BondLaw, target: BondLaw, reached: np.ndarray) -> bool:
+    """Whether bonds (m,) whose law differs in both stayed elastic in both, having opened up to `reached` (m,), m."""
+    if not isinstance(scaled, LinearSoftening) or not isinstance(target, LinearSoftening):
+        return False
+    if not np.allclose(scaled.k_n, target.k_n, rtol=1e-9, atol=0):
+        return False
+    pairs = ((scaled.f_max, target.f_max), (scaled.delta_max, target.delta_max))
+    unlike = np.logical_or(*(~np.isclose(a, b, rtol=1e-9, atol=0) for a, b in pairs))
+    unlike &= np.isfinite(scaled.f_max) | np.isfinite(target.f_max)
+    weaker = np.minimum(scaled.delta_peak, target.delta_peak)
+    return bool(np.all(reached[unlike] <= weaker[unlike]))

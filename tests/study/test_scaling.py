@@ -1,0 +1,72 @@
+"""The scaling law spares simulations only where it is exact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.core.problem import Problem
+from pipeline.core.units import MM
+from pipeline.equilibrium.solve import solve
+from pipeline.materials.cohesive import LinearSoftening
+from pipeline.study.scaling import leading_problem, member_solution, scaling_groups
+from tests.equilibrium.specimens import fracture_test
+
+
+@pytest.fixture(scope="module")
+def two_strengths() -> Problem:
+    """A beam with bonds far stronger than the others, which stay whole: the aggregate."""
+    problem = fracture_test(radius=2 * MM)
+    law, strong = problem.law, np.random.default_rng(3).random(problem.bonds.count) < 0.1
+    f_max = np.where(strong, 20 * law.f_max, law.f_max)
+    return replace(
+        problem,
+        law=LinearSoftening(law.k_n, f_max, np.where(strong, 20 * law.delta_max, law.delta_max)),
+        cmod_max=0.2 * MM,
+        stations=np.array([0.06, 0.15]) * MM,
+    )
+
+
+def weaker(problem: Problem, factor: float) -> Problem:
+    """The same with the strength and opening of all but the strong bonds times `factor`."""
+    law = problem.law
+    share = np.where(law.delta_max > 1.5 * law.delta_max.min(), 1.0, factor)
+    return problem.with_law(LinearSoftening(law.k_n, share * law.f_max, share * law.delta_max))
+
+
+def test_one_simulation_gives_another(two_strengths: Problem) -> None:
+    lead, factor = two_strengths, 0.8
+    leading = leading_problem(lead, [1.0, factor])
+    found, target = solve(leading), weaker(lead, factor)
+    spared, direct = member_solution(found, leading, target, factor), solve(target)
+    assert spared is not None
+    assert spared.cmod == pytest.approx(target.stations)
+    size = np.abs(direct.displacement).max()
+    # the two are followed in other increments, which two-phase beams feel up to 0.2 %
+    assert spared.displacement == pytest.approx(direct.displacement, abs=2e-3 * size)
+    at = target.stations
+    assert spared.curve.load_at(at) == pytest.approx(direct.curve.load_at(at), rel=5e-3)
+
+
+def test_where_strong_bonds_break_nothing_is_spared(two_strengths: Problem) -> None:
+    lead, factor = two_strengths, 0.8
+    leading = leading_problem(lead, [1.0, factor])
+    found = solve(leading)
+    torn = replace(found, reached=np.where(lead.law.f_max > 1.5 * lead.law.f_max.min(), 1e-3, found.reached))
+    assert member_solution(torn, leading, weaker(lead, factor), factor) is None
+
+
+def test_a_short_solution_is_not_used(two_strengths: Problem) -> None:
+    lead, factor = two_strengths, 0.8
+    assert member_solution(solve(lead), lead, weaker(lead, factor), factor) is None
+
+
+def test_a_square_grid_spares_its_diagonal() -> None:
+    """5 × 5 nodes at 0.8 … 1.2: the five of equal ratio are one simulation, and no others."""
+    nodes = [(f, d) for f in np.linspace(0.8, 1.2, 5) for d in np.linspace(0.8, 1.2, 5)]
+    groups = scaling_groups(nodes)
+    assert len(groups) == 21
+    diagonal = max(groups, key=len)
+    assert sorted(factor for _, factor in diagonal) == pytest.approx([0.8 / 1.2, 0.9 / 1.2, 1 / 1.2, 1.1 / 1.2, 1])
