@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from pipeline.options import Accuracy, Config, Debug, EngineChoice, Out, Radius, Seed, Workers, option
+from pipeline.options import Accuracy, Config, Debug, Engine, Out, Radius, Seed, Workers, factors, option
 from pipeline.terminal import Display, exit_codes, finish
 
 
 def diagnose(
     bundles: Annotated[list[Path], typer.Argument(metavar="BUNDLE", help="Folder of the experiment.")],
     out: Out,
-    engine: EngineChoice = None,
+    engine: Annotated[Engine | None, option("--engine", help="What simulates (default: equilibrium).")] = None,
     radius_mm: Radius = None,
     accuracy: Accuracy = None,
+    grid: Annotated[
+        Any,
+        option("--grid", metavar="FACTORS", parser=factors, help="Of the start (default: 0.7,0.85,1,1.15,1.3)."),
+    ] = None,
     without: Annotated[
         list[str] | None, option("--without", metavar="NAME", help="An effect left out of the library; repeatable.")
     ] = None,
@@ -36,6 +40,7 @@ def diagnose(
                 engine=engine,
                 radius_mm=radius_mm,
                 accuracy=accuracy,
+                grid=grid,
                 without=without or (),
                 config=config,
                 workers=workers,

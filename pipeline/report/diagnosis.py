@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import TwoSlopeNorm
+from matplotlib.colors import LogNorm
 
 from pipeline.core.units import KN, MM, UM
 from pipeline.gap.observation import STAGES, Observation, Reading
-from pipeline.report.style import BLUE, GREY, LIGHT, MEASURED, ORANGE, VERMILION, colour_bar
+from pipeline.report.style import BLACK, BLUE, GREY, LIGHT, MEASURED, ORANGE, VERMILION, colour_bar
 
 
 def where_map(axes: Axes, cells: Sequence[Mapping[str, Any]], stage: str, against: str = "z_gap") -> Axes:
@@ -30,10 +30,12 @@ def where_map(axes: Axes, cells: Sequence[Mapping[str, Any]], stage: str, agains
     for cell in mine:
         table[regions.index(cell["region"]), modes.index(cell["mode"])] = cell[against]
     loads = [c[against] for c in cells if c["stage"] == stage and c["channel"] == "load"]
-    image = axes.imshow(table, cmap="PuOr_r", norm=TwoSlopeNorm(1.0, 0.0, max(4.0, float(np.nanmax(table, initial=1)))))
+    worst = max([4.0, *(c[against] for c in cells if c["channel"] == "field")])
+    image = axes.imshow(table, cmap="YlOrRd", norm=LogNorm(1.0, worst), aspect="auto")
     for (row, column), value in np.ndenumerate(table):
         if np.isfinite(value):
-            axes.text(column, row, f"{value:.1f}", ha="center", va="center", fontsize=6)
+            dark = value > np.sqrt(worst) * 1.5
+            axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize=6, color="w" if dark else BLACK)
     axes.set_xticks(range(len(modes)), modes, rotation=35, ha="right")
     axes.set_yticks(range(len(regions)), regions)
     load = f"; load {loads[0]:.1f}" if loads else ""

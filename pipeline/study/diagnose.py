@@ -13,7 +13,7 @@ from pipeline.core.errors import InputError, PipelineError, UnavailableError
 from pipeline.core.problem import Problem, Solution
 from pipeline.execution.progress import Progress, Silent
 from pipeline.execution.simulations import SimulationError, run_all
-from pipeline.gap.diagnosis import Diagnosis, Outcome, Run
+from pipeline.gap.diagnosis import FACTORS, Diagnosis, Outcome, Run
 from pipeline.gap.diagnosis import diagnose as judge
 from pipeline.gap.library import nearest, shipped
 from pipeline.gap.response import Abscissae, Response
@@ -121,6 +121,7 @@ def diagnose(
     engine: str | None = None,
     radius_mm: float | None = None,
     accuracy: float | None = None,
+    grid: tuple[float, ...] | None = None,
     without: Sequence[str] = (),
     config: Path | None = None,
     workers: int | None = None,
@@ -135,6 +136,7 @@ def diagnose(
     ----------
     bundles : folders
     out : folder
+    grid : factors of the start, wider by default than those of an identification
     without : effects left out of the library
     the others : override the settings of `config`
     """
@@ -160,7 +162,7 @@ def diagnose(
     start = start_parameters(read)
     band = band_of(look, simulator, start)
     look = replace(look, observation=beside(look.observation, band.path))
-    result, diagnosis = judged(read, model, look, replace(simulator, band=band), settings.seed, without)
+    result, diagnosis = judged(read, model, look, replace(simulator, band=band), settings.seed, without, grid)
     result |= {"seconds": time.monotonic() - started, "engine": engine or ENGINE}
     write_result(folder, result)
     from pipeline.study.diagnose_page import diagnosis_page
@@ -193,6 +195,7 @@ def band_of(look: Seen, simulator: Simulator, start: tuple[float, float]) -> Ban
 def judged(
     bundle: Bundle, model: Model, look: Seen, simulator: Callable[[Sequence[Run]], list[Outcome]], seed: int,
     without: Sequence[str],
+    grid: tuple[float, ...] | None = None,
 ) -> tuple[dict, Diagnosis]:  # fmt: skip
     """The diagnosis and its result.json."""
     from pipeline.gap.effects import effect, library
@@ -211,5 +214,6 @@ def judged(
         entry,
         np.random.default_rng(seed),
         names,
+        grid or FACTORS,
     )
     return diagnosis_result(bundle, look, diagnosis, warnings, radius), diagnosis
