@@ -101,6 +101,7 @@ class BondCohesive : public Bond {
   template <bool FINITE> void all_forces();
   template <bool FINITE, bool SLIDING> void forces_of(Part &, bool guarded);
   template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void intact_forces(Part &);
+  static void put_in_order(std::vector<Worn> &, size_t ordered);
   template <bool FINITE, bool SLIDING> void leave(Part &, int first, Intact &);
   template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void worn_forces(Part &);
 

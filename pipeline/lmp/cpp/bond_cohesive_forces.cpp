@@ -109,6 +109,15 @@ void BondCohesive::apply(int i, int j, double length, const Arm &arm, double nor
     ev_tally_xyz(i, j, atom->nlocal, this->force->newton_bond, stored, fx, fy, 0.0, -arm.dx, -arm.dy, 0.0);
 }
 
+// lists keep the order in which they are built: a run that goes on from a restart adds in the same order, to the bit
+void BondCohesive::put_in_order(std::vector<Worn> &list, size_t ordered)
+{
+  if (list.size() == ordered) return;
+  std::inplace_merge(list.begin(), list.begin() + ordered, list.end(), [](const Worn &a, const Worn &b) {
+    return a.first != b.first ? a.first < b.first : a.slot < b.slot;
+  });
+}
+
 // a bond goes where it has a memory; its place stays, without any stiffness
 template <bool FINITE, bool SLIDING> void BondCohesive::leave(Part &own, int i, Intact &bond)
 {
@@ -119,6 +128,7 @@ template <bool FINITE, bool SLIDING> void BondCohesive::leave(Part &own, int i, 
 template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void BondCohesive::intact_forces(Part &own)
 {
   if (own.intact.empty()) return;
+  const size_t worn = own.worn.size(), slid_before = own.slid.size();
   const double *x = atom->x[0];
   double *f = atom->f[0];
   const Plain *types = plain.data();
@@ -177,6 +187,8 @@ template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void BondCohesive
     pair(f + i) += sum;
     if (SLIDING) torque[head.atom] += torsion;
   }
+  put_in_order(own.worn, worn);
+  put_in_order(own.slid, slid_before);
 }
 
 template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void BondCohesive::worn_forces(Part &own)
@@ -319,30 +331,28 @@ void BondCohesive::energies(double &stored, double &dissipated)
   }
 }
 
-// around each particle: sum of k_n n⊗n and a share of k_s s⊗s (columns xx, yy, xy); sum of k_s r²
+// around each particle: sum of k_n n⊗n and a share of k_s s⊗s (columns xx, yy, xy); sum of k_s r². In the order in
+// which particles keep their bonds, so that a restart finds the same bits
 void BondCohesive::add_stiffness(double **opening, double **turning, double share_of_sliding)
 {
   if (list_is_old()) build_list();
-  const auto add = [&](const Worn &b) {
-    const auto &own = law[b.type];
-    const double kn = own.k_n, ks = share_of_sliding * own.k_s, nx = b.nx, ny = b.ny;
-    for (const int i : {b.first, b.second}) {
-      if (!force->newton_bond && i >= atom->nlocal) continue;
-      opening[i][0] += kn * nx * nx + ks * ny * ny;
-      opening[i][1] += kn * ny * ny + ks * nx * nx;
-      opening[i][2] += (kn - ks) * nx * ny;
-      if (turning) turning[i][0] += own.k_s * 0.25 * b.length * b.length;
+  for (int i = 0; i < atom->nlocal; i++)
+    for (int m = 0; m < atom->num_bond[i]; m++) {
+      const int type = atom->bond_type[i][m];
+      if (type <= 0 || !setflag[type]) continue;
+      const double *row = history(i, m);
+      const double length = std::hypot(row[1], row[2]), nx = row[1] / length, ny = row[2] / length;
+      const double kn = law[type].k_n, ks = share_of_sliding * law[type].k_s;
+      const double twist = law[type].k_s * 0.25 * length * length;
+      const auto add = [&](int k) {
+        opening[k][0] += kn * nx * nx + ks * ny * ny;
+        opening[k][1] += kn * ny * ny + ks * nx * nx;
+        opening[k][2] += (kn - ks) * nx * ny;
+        turning[k][0] += twist;
+      };
+      add(i);    // without newton_bond the other end has a copy of its own
+      if (force->newton_bond) add(domain->closest_image(i, atom->map(atom->bond_atom[i][m])));
     }
-  };
-  for (const auto &own : part) {
-    const Intact *bond = own.intact.data();
-    for (const Head head : own.head)
-      for (const Intact *end = own.intact.data() + head.end; bond < end; bond++)
-        if (bond->type)
-          add({bond->nx, bond->ny, bond->length, head.atom, bond->second / 3, bond->type, 0, 0, 0.0, 0.0, 0.0});
-    for (const auto *list : {&own.worn, &own.slid, &own.crept})
-      for (const auto &b : *list) add(b);
-  }
 }
 
 double BondCohesive::single(int type, double /*rsq*/, int i, int j, double &fforce)
