@@ -27,6 +27,7 @@ from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance
 
 FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, for effects pull parameters away
 MOVES = 3  # how often the grid follows the best of the explanations that need no simulation
+BESIDE = (0.002, -0.002)  # of f_max: where a node is tried again at which no equilibrium is found
 LIKELY = 0.05  # probability from which a physics effect is simulated again at its best point
 CONFIRMED = 3  # at most so many
 CLOSED = 3  # best explanations whose closure is looked at
@@ -183,11 +184,8 @@ def baseline(
     """
     measuring = [n for n in sorted(names) if isinstance(effect(n), MeasurementEffect)]
     for _ in range(MOVES + 1):
-        outcomes = simulate([Run(f, d) for f, d in design.nodes()])
-        missing = [o for o in outcomes if isinstance(o, str)]
-        if missing:
-            raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {missing[0]}")
-        values = np.reshape([o.flat() for o in outcomes if not isinstance(o, str)], (*design.shape, -1))
+        outcomes = _nodes(simulate, [Run(f, d) for f, d in design.nodes()])
+        values = np.reshape([o.flat() for o in outcomes], (*design.shape, -1))
         emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values)
         look = _Look(*weighed(observation, emulator, entry), measuring, entry.temperature)
         fits, scored = look.judge(emulator, with_pairs=False)
@@ -198,6 +196,27 @@ def baseline(
             break
         design = moved
     return emulator, best
+
+
+def _nodes(simulate: Simulate, runs: list[Run]) -> list[Response]:
+    """The simulations of a grid; one that fails is made again right beside its node.
+
+    Raises
+    ------
+    ConvergenceError
+        where that fails too
+    """
+    outcomes = simulate(runs)
+    missing = [k for k, o in enumerate(outcomes) if isinstance(o, str)]
+    for shift in BESIDE:
+        if missing:
+            again = simulate([replace(runs[k], f_max=(1 + shift) * runs[k].f_max) for k in missing])
+            for k, outcome in zip(missing, again, strict=True):
+                outcomes[k] = outcome
+            missing = [k for k in missing if isinstance(outcomes[k], str)]
+    if missing:
+        raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {outcomes[missing[0]]}")
+    return [o for o in outcomes if not isinstance(o, str)]
 
 
 def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Observation, Data]:

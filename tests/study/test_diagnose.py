@@ -1,0 +1,150 @@
+"""The command from bundle to report: the contract of result.json, channels that are missing, going on."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.core.curve import LoadCurve
+from pipeline.core.errors import MissingFileError, UnavailableError
+from pipeline.core.field import DisplacementField
+from pipeline.core.specimen import SingleEdgeNotchedBeam
+from pipeline.gap.effects import library
+from pipeline.gap.library import nearest, parse, shipped, written
+from pipeline.store.bundle import read_bundle
+from pipeline.study.diagnose import diagnose
+from pipeline.study.diagnose_sight import abscissae, clear_of, crack_path, own_path, seen, sides
+from pipeline.study.virtual_test import virtual_test
+
+BEAM = SingleEdgeNotchedBeam(60e-3, 130e-3, 137e-3, 40e-3, 15e-3)
+GRID = (0.8, 1.0, 1.25)
+KEPT = {"modulus", "creep"}  # of the physics effects: one that is simulated, one that cannot be
+KEYS = {
+    "verdict", "named", "probability", "set_90", "equivalence_classes", "cannot_exclude", "estimate", "where",
+    "closure", "detection_limit", "parameters_before", "parameters_after", "separate_by",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gap") / "let-go"
+    virtual_test(folder, seed=5, radius_mm=2.0, effect=[("fixture_compliance_um_per_kn", 40.0)])
+    return folder
+
+
+def run(bundle: Path, out: Path) -> dict:
+    without = [n for n, e in library().items() if e.kind == "physics" and n not in KEPT]
+    diagnose([bundle], out, grid=GRID, without=without, workers=1)
+    return json.loads((out / "result.json").read_text("utf-8"))
+
+
+@pytest.mark.slow
+def test_a_bundle_is_diagnosed_and_the_same_call_goes_on(bundle, tmp_path):
+    result = run(bundle, tmp_path / "out")
+    assert set(result) >= KEYS
+    assert (result["verdict"], result["named"]) == ("cause", ["fixture_compliance_um_per_kn"])
+    low, high = result["estimate"]["fixture_compliance_um_per_kn"]["interval_95"]
+    assert low < 40 < high or abs(result["estimate"]["fixture_compliance_um_per_kn"]["value"] / 40 - 1) < 0.1
+    assert sum(result["probability"].values()) == pytest.approx(1.0)
+    assert list(result["not_tested"]) == ["creep"]
+    assert any("particles of 2 mm" in w for w in result["warnings"])  # outside what the library holds for
+    assert (tmp_path / "out" / "report.html").exists()
+    kept = sorted((tmp_path / "out" / "simulations").iterdir())
+    again = run(bundle, tmp_path / "out")
+    assert sorted((tmp_path / "out" / "simulations").iterdir()) == kept
+    assert again["probability"] == result["probability"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lacking", "told"), [("fields.h5", "no displacement fields"), ("load_cmod.csv", "no load")])
+def test_it_works_with_one_channel_and_says_what_it_cannot_see(bundle, tmp_path, lacking, told):
+    part = tmp_path / "part"
+    shutil.copytree(bundle, part)
+    (part / lacking).unlink()
+    result = run(part, tmp_path / "out")
+    assert any(told in remark for remark in result["remarks"])
+    assert {cell["channel"] for cell in result["where"]} == {"load" if lacking == "fields.h5" else "field"}
+
+
+def test_several_bundles_are_refused_by_name(tmp_path):
+    with pytest.raises(UnavailableError, match="one at a time"):
+        diagnose([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+
+
+def test_a_bundle_without_anything_measured_is_refused(bundle, tmp_path):
+    part = tmp_path / "part"
+    shutil.copytree(bundle, part)
+    (part / "fields.h5").unlink()
+    (part / "load_cmod.csv").unlink()
+    with pytest.raises(MissingFileError, match="neither"):
+        seen(read_bundle(part))
+
+
+def torn(path, step: float = 1.5e-3, noise: float = 4e-7) -> DisplacementField:
+    """Two halves that part by 0.2 mm along a path x(y), up to y = 40 mm."""
+    x, y = np.meshgrid(np.arange(-18e-3, 18.1e-3, step), np.arange(6e-3, 45e-3, step))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    opening = 1e-4 * np.clip((40e-3 - points[:, 1]) / 25e-3, 0, None)
+    side = np.where(points[:, 0] > path(points[:, 1]), 1.0, -1.0)
+    field = np.column_stack([side * opening, np.zeros(len(points))])
+    field = field + noise * np.random.default_rng(0).standard_normal(field.shape)
+    frames = np.stack([0 * field, field / 2, field])
+    shape = frames.shape[:2]
+    return DisplacementField(points, frames, np.ones(shape, bool), np.full(shape, noise), np.arange(3.0))
+
+
+@pytest.mark.parametrize("step", [1.5e-3, 0.75e-3])
+def test_the_crack_path_is_found_to_a_millimetre(step):
+    def truth(y):
+        return 2e-3 * np.sin((y - 15e-3) / 8e-3)
+
+    found = crack_path(torn(truth, step), BEAM)
+    low = (found[:, 1] > 17e-3) & (found[:, 1] < 36e-3)
+    assert low.sum() > 8
+    # the coarse way: half a step, and the median of three; the fine one goes straight on where its windows meet the tip
+    assert np.abs(found[low, 0] - truth(found[low, 1])).max() < (0.75 * step if step > 1e-3 else 1e-3)
+
+
+def test_a_field_without_a_crack_has_no_path():
+    whole = torn(lambda y: 0 * y)
+    still = DisplacementField(whole.points, 0 * whole.displacement, whole.valid, whole.std, whole.abscissa)
+    assert crack_path(still, BEAM) is None
+
+
+def test_points_know_their_flank_and_their_distance():
+    path = np.array([[0, 15], [4, 25], [4, 40]]) * 1e-3
+    points = np.array([[3, 16], [3, 30], [6, 30], [9, 30]]) * 1e-3
+    assert sides(points, path).tolist() == [1, -1, 1, 1]
+    assert clear_of(points, path).tolist() == [False, False, False, True]
+
+
+def test_the_models_own_path_is_that_of_its_broken_bonds():
+    y = np.arange(15.5, 50, 1.0)
+    position = np.vstack([np.column_stack([0.1 * y - 1, y]), np.column_stack([0.1 * y + 1, y])]) * 1e-3
+    pairs = np.column_stack([np.arange(y.size), y.size + np.arange(y.size)])
+    found = own_path(position, pairs, (y < 40).astype(float), np.array(BEAM.tip))
+    inner = found[(found[:, 1] > 17e-3) & (found[:, 1] < 37e-3)]
+    assert np.allclose(inner[:, 0], 0.1 * inner[:, 1], atol=1e-4)  # weighted over 2 mm, symmetric
+
+
+def test_simulations_reach_beyond_what_a_gauge_may_hide():
+    curve = LoadCurve(np.arange(5.0), np.linspace(0, 6e-4, 5), np.array([0, 3.0, 2, 1, 0]))
+    stations = np.array([1e-4, 3e-4, 5e-4])
+    found = abscissae(stations, curve)
+    assert found.field[-1] > 5.2e-4
+    assert (np.diff(found.load) > 0).all()
+
+
+def test_the_library_that_ships_is_sound():
+    for entry in shipped():
+        values = np.linalg.eigvalsh(entry.discrepancy.correlation)
+        assert values.min() > 0
+        assert entry.temperature >= 1
+        assert entry.discrepancy.samples >= 4
+    one = nearest(shipped(), "seb", 1e-3)
+    again = parse(json.loads(written([one], {})))[0]
+    assert np.allclose(again.discrepancy.amplitude, one.discrepancy.amplitude, rtol=1e-9)
