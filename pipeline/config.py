@@ -26,6 +26,12 @@ def _increasing(factors: tuple[float, ...]) -> tuple[float, ...]:
     return factors
 
 
+def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise ValueError("must name each parameter once")
+    return names
+
+
 def _odd(value: int) -> int:
     if value % 2 == 0:
         raise ValueError("must be odd: a subset has a centre")
@@ -89,6 +95,27 @@ class RunSettings(BaseModel):
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,
         description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",
+    )
+    more_parameters: Annotated[
+        tuple[
+            Literal[
+                "aggregate_strength_ratio",
+                "interface_strength_ratio",
+                "interface_opening_ratio",
+                "shear_strength_ratio",
+                "mastic_modulus",
+            ],
+            ...,
+        ],
+        Field(strict=False, max_length=2),
+        AfterValidator(_distinct),
+    ] = Field(
+        default=(),
+        description="one or two further parameters, estimated together with f_max and delta_max on a sparse grid of 25 "
+        "or 41 simulations about the optimum",
+    )
+    more_parameters_range: Annotated[float, Field(gt=0, le=0.9)] = Field(
+        default=0.1, description="half the width of that grid, relative, in every parameter"
     )
     viscoelastic: bool = Field(default=False, description="Burgers bonds from creep.csv")
     subset_size_px: Annotated[int, Field(ge=5, le=201), AfterValidator(_odd)] | None = Field(

@@ -14,6 +14,7 @@ from pipeline.inverse.newton import Minimum, minimise
 from pipeline.inverse.objective import Comparison, Objective, Rigid, compare, differences, left_out
 from pipeline.inverse.observations import Measured, Simulated
 from pipeline.inverse.placements import Placements
+from pipeline.inverse.radial import radial_minimum
 from pipeline.inverse.resolution import data_minimum, resolves
 from pipeline.inverse.squares import SquaredDifference
 from pipeline.inverse.surrogate import LagrangeSurrogate, leave_one_out
@@ -81,6 +82,8 @@ class Estimate:
     displacement : (s, p, 2) array, m, or None; the simulated field at the optimum, interpolated over the grid
     load : (s,) array, N, or None; likewise
     left_out : tuple of str; data missing somewhere
+    radial_position : (2,) array, N and m; the minimum with radial basis functions instead of multinomials
+    placements : Placements that were averaged, or None
     """
 
     design: Design
@@ -102,6 +105,8 @@ class Estimate:
     displacement: np.ndarray | None
     load: np.ndarray | None
     left_out: tuple[str, ...]
+    radial_position: np.ndarray
+    placements: Placements | None = None
 
     @property
     def f_max(self) -> float:
@@ -151,7 +156,20 @@ class Estimate:
                 f"With interpolated data instead of an interpolated objective the optimum is ({f_max:.4g} N, "
                 f'{delta_max:.3g} m), further off than noise and discrepancy explain: set surrogate = "data".'
             )
+        if self.uncertainty is not None and self._swings(self.uncertainty):
+            f_max, delta_max = self.radial_position
+            found.append(
+                f"Radial basis functions through the same simulations have their optimum at ({f_max:.4g} N, "
+                f"{delta_max:.3g} m), more than a standard deviation away: the interpolation between nodes matters, "
+                "use a finer grid."
+            )
         return (*found, *self.left_out)
+
+    def _swings(self, doubt: Uncertainty) -> bool:
+        """Whether the second surrogate's optimum lies further off than a standard deviation in either parameter."""
+        size = np.sqrt(np.diag(doubt.covariance))
+        far = np.abs(self.radial_position - self.minimum.position) > size
+        return bool(far.any()) and self.settings.surrogate is Surrogate.DATA
 
 
 def estimate(
@@ -219,6 +237,8 @@ def estimate(
         displacement=_at(displacement, best.position, simulated.displacement),
         load=_at(load, best.position, simulated.load),
         left_out=left_out(comparison),
+        radial_position=radial_minimum(interpolated, comparison.target),
+        placements=placements,
     )
 
 

@@ -11,7 +11,7 @@ EDGE = 1e-6  # of the range: nearer to a bound than this is on it
 
 
 class Smooth(Protocol):
-    """A function of (f_max, delta_max) with exact derivatives on a box."""
+    """A function of d parameters, of (f_max, delta_max) first of all, with exact derivatives on a box."""
 
     @property
     def lower(self) -> np.ndarray: ...
@@ -28,9 +28,9 @@ class Minimum:
 
     Parameters
     ----------
-    position : (2,) array, f_max in N and delta_max in m
+    position : (d,) array; f_max in N and delta_max in m, further parameters after them
     value : float; the function there
-    hessian : (2, 2) array, unscaled
+    hessian : (d, d) array, unscaled
     converged : bool; gradient and step below tolerance, or held by a bound
     interior : bool; on no bound
     iterations : int
@@ -49,7 +49,8 @@ class Minimum:
         diagonal = np.diag(self.hessian)
         if not (np.isfinite(self.hessian).all() and (diagonal > 0).all()):
             return False
-        return bool(self.hessian[0, 1] ** 2 < (1 - 1e-9) * diagonal.prod())
+        scale = np.sqrt(diagonal)
+        return bool(np.linalg.eigvalsh(self.hessian / np.outer(scale, scale))[0] > 5e-10)
 
     @property
     def status(self) -> str:
@@ -69,7 +70,7 @@ def minimise(function: Smooth, starts: np.ndarray, tolerance: float = 1e-9) -> l
     Parameters
     ----------
     function : Smooth
-    starts : (k, 2) array, inside the box
+    starts : (k, d) array, inside the box
     tolerance : float; of the step, as a share of the box
 
     Returns
@@ -117,7 +118,7 @@ def _step(gradient: np.ndarray, hessian: np.ndarray, free: np.ndarray) -> np.nda
 
     Turning negative curvatures round keeps the step downhill and off saddle points; at most half the box.
     """
-    step = np.zeros(2)
+    step = np.zeros_like(gradient)
     if not free.any():
         return step
     curvature, axes = np.linalg.eigh(hessian[np.ix_(free, free)])

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from pipeline.inverse.surrogate import LagrangeSurrogate
+
+
+class Weights(Protocol):
+    """Weights of the n nodes of a grid at a point, which add up to one, with their derivatives."""
+
+    @property
+    def lower(self) -> np.ndarray: ...
+    @property
+    def upper(self) -> np.ndarray: ...
+    def value(self, parameters: np.ndarray) -> np.ndarray: ...
+    def gradient(self, parameters: np.ndarray) -> np.ndarray: ...
+    def hessian(self, parameters: np.ndarray) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -22,11 +35,11 @@ class SquaredDifference:
 
     Parameters
     ----------
-    weights : LagrangeSurrogate of the n nodes' weights, (n,) a point
+    weights : Weights of the n nodes
     gram : (n, n) array
     """
 
-    weights: LagrangeSurrogate
+    weights: Weights
     gram: np.ndarray
 
     @staticmethod
@@ -63,5 +76,4 @@ class SquaredDifference:
 
     def on_grid(self, f_max: np.ndarray, delta_max: np.ndarray) -> np.ndarray:
         """Φ on another tensor grid, for pictures; (len(f_max), len(delta_max))."""
-        weight = self.weights.on_grid(f_max, delta_max)
-        return np.einsum("abn,nm,abm->ab", weight, self.gram, weight, optimize=True)
+        return np.array([[self.value(np.array([f, d])) for d in delta_max] for f in f_max])

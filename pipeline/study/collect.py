@@ -17,9 +17,11 @@ from pipeline.hpc.manifest import Manifest, Point, read_manifest
 from pipeline.hpc.points import Found, State, damaged_files, lammps_versions, look_at, solution_of
 from pipeline.store.bundle import read_bundle
 from pipeline.store.problem_key import problem_key
+from pipeline.study.campaign import Campaign, first_grid, prepare, run_optimum, search
 from pipeline.study.engines import Engine
 from pipeline.study.export import BUNDLE
-from pipeline.study.identify import Campaign, conclude, first_grid, prepare, run_optimum, search
+from pipeline.study.identify import conclude
+from pipeline.study.widening import widening
 
 
 def collect(out: Path, *, workers: int | None = None, dask: str | None = None, progress: Progress | None = None) -> str:
@@ -49,8 +51,10 @@ def collect(out: Path, *, workers: int | None = None, dask: str | None = None, p
         keep_points(campaign, out, manifest)
         found = search(campaign, aim)
         problem, optimum = run_optimum(campaign, found)
+        more = widening(campaign, found)
     model = replace(campaign.model, remarks=(*campaign.model.remarks, *remarks(out, manifest)))
-    return conclude(replace(campaign, model=model), folder, found, problem, optimum, time.monotonic() - started)
+    seconds = time.monotonic() - started
+    return conclude(replace(campaign, model=model), folder, found, problem, optimum, seconds, more)
 
 
 def keep_points(campaign: Campaign, out: Path, manifest: Manifest) -> None:

@@ -27,7 +27,7 @@ from pipeline.store.atomic import refused
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.problem_key import problem_key
 from pipeline.study.assembly import settings_of
-from pipeline.study.identify import Campaign, first_grid, prepare
+from pipeline.study.campaign import Campaign, first_grid, prepare
 
 BUNDLE = "bundle"  # copy of the test in the study, so that it can be read back anywhere
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline.core.curve import LoadCurve
@@ -91,3 +93,25 @@ def _everything_until(end: float, measured: Measured) -> Simulated:
     field = measured.field
     shown = None if field is None else np.broadcast_to(reached[:, None, None], field.displacement.shape)[None, None]
     return Simulated(shown, reached[None, None])
+
+
+def refuse_inert(model: Model, names: Sequence[str], aim: Objective) -> None:
+    """Refuse further parameters that this test cannot feel.
+
+    Raises
+    ------
+    InputError
+        for the modulus where no load is compared (fields depend on f_max over K^n alone), and for sliding where
+        bonds carry no shear
+    """
+    if "mastic_modulus" in names and aim is Objective.FIELDS:
+        raise InputError(
+            "more_parameters: mastic_modulus cannot be found from fields alone, which depend on f_max/K^n only: "
+            "compare the load too, with --objective both"
+        )
+    if "shear_strength_ratio" in names and not model.mixture.shear_ratio:
+        raise InputError(
+            "more_parameters: shear_strength_ratio cannot be found at "
+            f"poissons_ratio = {model.mixture.poissons_ratio:g} in plane {model.mixture.plane}: bonds carry no shear "
+            "there (K^s = 0)"
+        )
