@@ -10,6 +10,8 @@ from pipeline.core.errors import ConvergenceError
 from pipeline.equilibrium.model import State, rest, scaled
 from pipeline.equilibrium.step import Stepper
 
+HALVINGS = 4  # of an increment in which load or energy leap, before that is taken for a jump
+
 
 @dataclass(frozen=True)
 class Increments:
@@ -95,14 +97,14 @@ class Path:
         """The next equilibrium, at most `wanted` (m) further open, less where the load or the energy would leap."""
         self._choose_control(before, state)
         rough = None
-        for halving in range(5):
+        for halving in range(HALVINGS + 1):
             found = self._attempt(before, state, wanted / 2**halving)
             if found is not None and self._smooth(state, found):
                 return found
-            rough = rough or found
+            rough = found or rough
             self.gauge_controlled = self.snap_back and (self.gauge_controlled or halving >= 1)
         if rough is None:
-            rough = self._machine(before, state, wanted, np.inf)
+            rough = self._machine(before, state, wanted / 2**HALVINGS, np.inf)
         if rough is None:
             raise ConvergenceError(
                 f"no equilibrium found beyond CMOD = {state.cmod * 1e3:.4g} mm (load {state.load:.4g} N): "

@@ -21,14 +21,14 @@ from pipeline.store.simulation import SimulationStore
 from pipeline.study.agreement import Check, curve_difference, field_difference, order_of_convergence
 from pipeline.study.closed_forms import closed_form_checks
 from pipeline.study.cross_check_page import cross_check_page
-from pipeline.study.engines import engine
+from pipeline.study.engines import FORWARD, engine
 from pipeline.study.observation import observe_solution
 from pipeline.study.output import plain_folder
 from pipeline.study.scaling import scaled_problem
 from pipeline.study.specimens import Trial, section_trial
 
 ACCURACIES = (0.1, 0.03, 0.01, 0.003)  # of the runs that show convergence
-JUMPED = 0.15  # by how much loads may differ where a crack has jumped
+JUMPED = 0.05  # by how much loads may differ behind a jump: inertia carries an explicit run over it
 SCALE = 1.25  # of strengths and openings in the check of the scaling law
 
 
@@ -48,7 +48,7 @@ class Run:
     @property
     def name(self) -> str:
         problem = self.trial.problem
-        asked = "" if self.engine == "equilibrium" else f", {problem.accuracy:.1%}"
+        asked = "" if self.engine in ("equilibrium", FORWARD) else f", {problem.accuracy:.1%}"
         return f"{self.trial.name}, {problem.kinematics.value}: {self.engine}{asked}"
 
 
@@ -166,16 +166,23 @@ def _steps(results: Results, trial: Trial) -> list[Check]:
 
 
 def _engines(results: Results, trial: Trial, accuracies: tuple[float, ...]) -> list[Check]:
-    """LAMMPS against equilibrium, at the accuracies asked for."""
+    """LAMMPS against equilibrium, at the accuracies asked for.
+
+    Where the crack jumps under CMOD control it does so from another state than where the machine cannot move
+    back, as in an explicit run: there the limit is the equilibrium under a machine that only moves forward.
+    """
     limit, checks = Run(trial, "equilibrium"), []
     results.simulate([limit])
     jumps = "jumped" in results.solution(limit).message
-    reason = "the crack jumps: the way behind is not unique" if jumps else "the accuracy asked for"
+    reason = "the crack jumps: inertia carries an explicit run over it" if jumps else "the accuracy asked for"
+    if jumps:
+        limit = Run(trial, FORWARD)
+        results.simulate([limit])
     for accuracy in accuracies:
         run = Run(trial.with_accuracy(accuracy), "lammps")
         results.simulate([run])
         for what, apart in zip(("load", "field"), results.apart(run, limit), strict=True):
-            compared = f"{what}, lammps at {accuracy:.1%} and equilibrium"
+            compared = f"{what}, lammps at {accuracy:.1%} and {limit.engine}"
             checks.append(Check(trial.name, compared, apart, JUMPED if jumps else accuracy, reason))
     return checks
 
@@ -245,8 +252,10 @@ def _energies(results: Results) -> list[Check]:
     checks = []
     for name in sorted({run.engine for run in results.runs}):
         found = [results.solution(run) for run in results.runs if run.engine == name]
-        worst = max(solution.energy.error for solution in found if "jumped" not in solution.message)
-        reason = "trapezoids over the increments" if name == "equilibrium" else "leapfrog, second order in the step"
+        worst = max(solution.energy.error for solution in found)
+        reason = (
+            "trapezoids over the increments" if name.startswith("equilibrium") else "leapfrog, second order in the step"
+        )
         checks.append(Check("all specimens", f"energy not accounted for, {name}", worst, 1e-3, reason))
     return checks
 
@@ -292,7 +301,7 @@ def _run_result(run: Run, solution: Solution) -> dict[str, Any]:
     return {
         "name": run.name,
         "engine": run.engine,
-        "accuracy": problem.accuracy if run.engine != "equilibrium" else None,
+        "accuracy": None if run.engine.startswith("equilibrium") else problem.accuracy,
         "kinematics": problem.kinematics.value,
         "particles": problem.particles.count,
         "steps": solution.steps,

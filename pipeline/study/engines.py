@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,6 +11,8 @@ from functools import partial
 from pipeline import __version__
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import Problem, Solution
+
+FORWARD = "equilibrium, machine forward"  # for the cross-check: jumps where the explicit engines must jump
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ def engine(name: str, ranks: int = 1) -> Engine:
         from pipeline.equilibrium import solve
 
         return Engine(f"equilibrium to {solve.TOLERANCE:g}, cohesive-bpm {__version__}", solve.solve)
+    if name == FORWARD:
+        from pipeline.equilibrium import solve
+
+        label = f"{FORWARD} to {solve.TOLERANCE:g}, cohesive-bpm {__version__}"
+        return Engine(label, functools.partial(solve.solve, snap_back=False))
     if name == "reference":
         from pipeline.reference import solve as steps
 
