@@ -135,8 +135,27 @@ def diagnose(
     look = _Look(*weighed(observation, emulator, entry), known, entry.temperature)
     fits, scored = look.judge(emulator)
     emulator = confirmed(emulator, counted, fits, scored)
+    return concluded(observation, emulator, entry, known, untested, rng, len(counted.asked))
+
+
+def concluded(
+    observation: Observation,
+    emulator: Emulator,
+    entry: Entry,
+    known: list[str],
+    untested: Mapping[str, str],
+    rng: np.random.Generator,
+    runs: int,
+) -> Diagnosis:
+    """Judge with all simulations at hand.
+
+    Raises
+    ------
+    ConvergenceError
+        where the best explanation lies on the edge of the grid
+    """
     observation, data = weighed(observation, emulator, entry)
-    fits, scored = replace(look, observation=observation, data=data).judge(emulator)
+    fits, scored = _Look(observation, data, known, entry.temperature).judge(emulator)
     singles = {n: emulator.candidate([n], observation.mask) for n in known}
     best = fits[scored.ranked()[0]]
     table = card(singles, data, best.parameters, entry.temperature)
@@ -161,7 +180,7 @@ def diagnose(
         closures=closures(observation, data, fits, scored, rng),
         verdict=verdict(scored, table, judged),
         untested=untested,
-        runs=len(counted.asked),
+        runs=runs,
     )
 
 

@@ -46,9 +46,11 @@ def run(bundle: Path, out: Path) -> dict:
 def test_a_bundle_is_diagnosed_and_the_same_call_goes_on(bundle, tmp_path):
     result = run(bundle, tmp_path / "out")
     assert set(result) >= KEYS
-    assert (result["verdict"], result["named"]) == ("cause", ["fixture_compliance_um_per_kn"])
-    low, high = result["estimate"]["fixture_compliance_um_per_kn"]["interval_95"]
-    assert low < 40 < high or abs(result["estimate"]["fixture_compliance_um_per_kn"]["value"] / 40 - 1) < 0.1
+    assert (
+        "fixture_compliance_um_per_kn" in result["named"]
+    )  # the library does not hold at 2 mm: others may stand beside
+    estimate = result["estimate"]["fixture_compliance_um_per_kn"]
+    assert estimate["value"] == pytest.approx(40, rel=0.1)  # particles of 2 mm: two µm in forty
     assert sum(result["probability"].values()) == pytest.approx(1.0)
     assert list(result["not_tested"]) == ["creep"]
     assert any("particles of 2 mm" in w for w in result["warnings"])  # outside what the library holds for
