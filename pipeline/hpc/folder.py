@@ -21,7 +21,6 @@ from pipeline.lmp.stock import STOCK_DECK, read_stock_solution, solve_stock, wri
 
 INPUTS = "inputs.sha256"
 PLAIN = ("environment", "submit.slurm", "README.md")  # meant to be edited: not in the manifest
-VERSIONS = {"22 Jul 2025": True, "29 Aug 2024": False, "2 Aug 2023": False}  # tested?
 BEGUN = "unfinished-study.txt"  # marks what an export that was stopped has left
 SECONDS = 30.0  # between restart files, on one core
 PER_BOND = 5e-9  # s of a core a bond and step, measured (scripts/benchmark_scale.py)
@@ -48,27 +47,36 @@ class Job:
 
 @dataclass(frozen=True)
 class Variant:
-    """A kind of deck: its name in the manifest, its file, what it needs, how it is written, read back and run here."""
+    """A kind of deck: name in the manifest, file, the LAMMPS it needs, how it is written, read back and run here."""
 
     name: str
     deck: str
     packages: str
+    versions: dict[str, str]
     write: Callable[[Path, Problem, int], object]
     read: Callable[[Problem, Path, float], Solution]
     solve: Callable[[Problem], Solution] | None = None  # None: as the engine does
 
 
-def _stock(kind: str, packages: str) -> Variant:
+def _stock(kind: str, packages: str, versions: dict[str, str]) -> Variant:
     write, solve = partial(write_stock_deck, kind=kind), partial(solve_stock, kind=kind)
-    return Variant(kind, STOCK_DECK, packages, write, read_stock_solution, solve)
+    return Variant(kind, STOCK_DECK, packages, versions, write, read_stock_solution, solve)
 
 
+TESTED, UNTESTED, OLD = "tested", "not tested", "too old"
 VARIANTS = {
     "cohesive": Variant(
-        "cohesive", DECK, "MOLECULE and PLUGIN (or the style built in)", write_deck, simulate.read_solution
+        "cohesive",
+        DECK,
+        "MOLECULE and PLUGIN (or the style built in)",
+        {"22 Jul 2025": TESTED, "later ones": UNTESTED, "29 Aug 2024": OLD},
+        write_deck,
+        simulate.read_solution,
     ),
-    "table": _stock("table", "MOLECULE"),
-    "plastic": _stock("plastic", "MOLECULE and BPM, of April 2025 or later,"),
+    "table": _stock("table", "MOLECULE", {"22 Jul 2025": TESTED, "29 Aug 2024": TESTED, "2 Aug 2023": OLD}),
+    "plastic": _stock(
+        "plastic", "MOLECULE and BPM", {"22 Jul 2025": TESTED, "2 Apr 2025": UNTESTED, "4 Feb 2025": OLD}
+    ),
 }
 
 
@@ -221,5 +229,5 @@ def _readme_words(manifest: Manifest, variant: Variant, stretch: int) -> dict[st
         "first": style if variant.name == "cohesive" else stock,
         "stretch": stretch,
         "packages": variant.packages,
-        "versions": ", ".join(f"{name} ({'' if tested else 'not '}tested)" for name, tested in manifest.lammps.items()),
+        "versions": ", ".join(f"{name} ({state})" for name, state in manifest.lammps.items()),
     }

@@ -61,7 +61,7 @@ class Manifest:
     variant: str
     engine: str
     settings: dict[str, Any]
-    lammps: dict[str, bool]
+    lammps: dict[str, str]
     points: tuple[Point, ...]
     files: dict[str, str] = field(default_factory=dict)
 

@@ -13,7 +13,6 @@ from pipeline.core.errors import UnavailableError
 from pipeline.execution.progress import Progress, Silent
 from pipeline.hpc.folder import (
     VARIANTS,
-    VERSIONS,
     Job,
     begin_study,
     default_stretch,
@@ -77,7 +76,7 @@ def export(
     stretch = settings.restart_steps or default_stretch(problems[0], settings.ranks)
     plain = settings.model_dump(mode="json", exclude_none=True)
     manifest = Manifest(
-        study, __version__, read.name, variant.name, campaign.engine.label, plain, VERSIONS, tuple(points)
+        study, __version__, read.name, variant.name, campaign.engine.label, plain, variant.versions, tuple(points)
     )
     manifest = manifest.with_points(write_points(out, study, points, problems, variant, stretch))
     write_scripts(out, manifest, variant, job_of(settings), stretch)

@@ -21,7 +21,7 @@ POINTS = (Point(0, 64.0, 1e-4, "a" * 64, "b" * 64), Point(1, 71.0, 1.14e-4, "c" 
 def manifest(name: str = "seb-07") -> Manifest:
     """A manifest of two points."""
     keys = [point.key for point in POINTS]
-    engine, versions = "lammps 1", {"22 Jul 2025": True}
+    engine, versions = "lammps 1", {"22 Jul 2025": "tested"}
     return Manifest(study_of(keys), "1", name, "cohesive", engine, {"accuracy": 0.01}, versions, POINTS, {"a": "b"})
 
 
