@@ -213,7 +213,6 @@ def identify(
     """Estimate f_max and delta_max of the mastic from a test."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(viscoelastic=viscoelastic)
             from pipeline.study.identify import identify as estimate
 
             summary = estimate(
@@ -227,6 +226,7 @@ def identify(
                 fields=fields,
                 levelling=levelling or None,
                 placements=placements,
+                viscoelastic=viscoelastic or None,
                 config=config,
                 workers=workers,
                 ranks=ranks,

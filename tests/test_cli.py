@@ -148,7 +148,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
 @pytest.mark.parametrize(
     ("line", "option"),
     [
-        (COMMANDS["identify"], ["--viscoelastic"]),
         (COMMANDS["virtual_test"], ["--creep", "creep.csv"]),
     ],
 )
@@ -190,7 +189,7 @@ def test_options_reach_the_study(study):
     ]
     more = ["--accuracy", "0.02", "--fields", "f.h5", "--config", "c.toml", "--workers", "2", "--levelling"]
     more += ["--ranks", "4", "--dask", "tcp://head:8786"]
-    more += ["--placements", "3"]
+    more += ["--placements", "3", "--viscoelastic"]
     assert run("identify", "B", "-o", "O", *options, *more).exit_code == 0
     told = dict(study.options)
     assert study.args == (Path("B"), Path("O"))
@@ -204,6 +203,7 @@ def test_options_reach_the_study(study):
         "fields": Path("f.h5"),
         "levelling": True,
         "placements": 3,
+        "viscoelastic": True,
         "config": Path("c.toml"),
         "workers": 2,
         "ranks": 4,

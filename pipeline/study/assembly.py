@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.particles import Bonds, Particles
 from pipeline.core.problem import Gauge, Grip, Problem
 from pipeline.core.units import GPA
+from pipeline.materials.burgers import Burgers
 from pipeline.materials.creeping_mixture import creeping_law
 from pipeline.materials.mixture import Mixture
 from pipeline.materials.softening import Shape, Softening, Unloading, named_shape
@@ -60,6 +62,11 @@ class Model:
     report: PackingReport
     remarks: tuple[str, ...]
 
+    @cached_property
+    def burgers(self) -> Burgers:
+        """The mastic's creep as creep.csv of the bundle has it; refuses where there is none."""
+        return mastic_creep(self.bundle).burgers
+
     @property
     def force_scale(self) -> float:
         """f_max of this lattice over f_max of the bundle's: f_max/(2 r t) is kept."""
@@ -96,9 +103,7 @@ class Model:
             specimen=self.bundle.specimen,
             particles=self.particles,
             bonds=self.bonds,
-            law=creeping_law(mixture, mastic_creep(self.bundle).burgers, *properties)
-            if creeps
-            else mixture.law(*properties),
+            law=creeping_law(mixture, self.burgers, *properties) if creeps else mixture.law(*properties),
             grips=self.grips,
             gauge=self.gauge,
             kinematics=self.bundle.model.motion,

@@ -26,7 +26,7 @@ from pipeline.store.problem_key import problem_key
 from pipeline.store.results import prepare_output
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
-from pipeline.study.assembly import Model, build_model
+from pipeline.study.assembly import CREEPING, Model, build_model
 from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
 from pipeline.study.dic import summary as summary_of_images
@@ -71,7 +71,12 @@ class Campaign:
 
     def problem(self, f_max: float, delta_max: float) -> Problem:
         """The test at one node of the grid."""
-        return self.model.problem(f_max, delta_max, accuracy=self.settings.accuracy)
+        return self.problem_of(self.model, f_max, delta_max)
+
+    def problem_of(self, model: Model, f_max: float, delta_max: float) -> Problem:
+        """The test at one node of the grid, of a model that differs in placement or material."""
+        law = CREEPING if self.settings.viscoelastic else None
+        return model.problem(f_max, delta_max, accuracy=self.settings.accuracy, law=law)
 
     def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """Simulate the nodes that the store does not hold; all of them, in order."""
@@ -143,6 +148,8 @@ def prepare(
     measured = measured_test(read.need_curve(), field, read.stations, read.observation_points)
     refuse_hopeless(model, measured, aim, Rigid(settings.rigid))
     refuse_inert(model, settings.more_parameters, aim)
+    if settings.viscoelastic:
+        model.burgers  # noqa: B018 - refuses before anything runs
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(prepare_output(folder / "simulations"))
     level = leveller(read, settings, points, folder, chosen.label) if settings.levelling else None
@@ -196,7 +203,7 @@ def placed_elsewhere(campaign: Campaign, found: Estimate, aim: Objective) -> Pla
     models = [model, *elsewhere(model, settings.placement_count)]
     runs = campaign.solved(
         [
-            (f"placement {k} of the lattice", one.problem(found.f_max, found.delta_max, accuracy=settings.accuracy))
+            (f"placement {k} of the lattice", campaign.problem_of(one, found.f_max, found.delta_max))
             for k, one in enumerate(models)
         ]
     )

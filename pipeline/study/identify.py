@@ -38,6 +38,7 @@ def identify(
     fields: Path | None = None,
     levelling: bool | None = None,
     placements: int | None = None,
+    viscoelastic: bool | None = None,
     config: Path | None = None,
     workers: int | None = None,
     ranks: int | None = None,
@@ -55,12 +56,13 @@ def identify(
     fields : a field file instead of the bundle's own
     levelling : send simulated fields through the correlation before they are compared
     placements : other placements of the lattice that are averaged at the optimum
+    viscoelastic : let the mastic creep as the bundle's creep.csv says, in the time of the record
     the others : override the settings of `config`
     """
     started = time.monotonic()
     options = {"engine": engine, "grid": grid, "objective": objective, "radius_mm": radius_mm}
     options |= {"accuracy": accuracy, "workers": workers, "ranks": ranks, "dask": dask, "seed": seed}
-    options |= {"levelling": levelling or None, "placement_count": placements}
+    options |= {"levelling": levelling or None, "placement_count": placements, "viscoelastic": viscoelastic}
     settings = settings_of(config, **options)
     read = read_bundle(bundle, fields)
     progress = progress or Silent()
@@ -124,6 +126,7 @@ def identification_result(
         and {"f_max_n": doubt.noise_only["f_max"], "delta_max_m": doubt.noise_only["delta_max"]},
         "correlation": doubt and doubt.correlation,
         "covariance": doubt and doubt.covariance,
+        "viscoelastic": campaign.settings.viscoelastic,
         "objective": found.settings.objective,
         "surrogate": found.settings.surrogate,
         "paper": paper_result(found),

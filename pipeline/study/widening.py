@@ -43,7 +43,7 @@ def varied(campaign: Campaign, names: Sequence[str], values: np.ndarray) -> Prob
     """The test at values of f_max (N), delta_max (m) and of further properties of the mixture."""
     more = {name: float(value) for name, value in zip(names[2:], values[2:], strict=True)}
     model = replace(campaign.model, mixture=replace(campaign.model.mixture, **more))  # type: ignore[arg-type]
-    return model.problem(float(values[0]), float(values[1]), accuracy=campaign.settings.accuracy)
+    return campaign.problem_of(model, float(values[0]), float(values[1]))
 
 
 def widened_result(found: Widened | None) -> dict[str, Any] | None:

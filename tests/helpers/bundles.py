@@ -13,10 +13,11 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.core.units import MM
 from pipeline.lmp.simulate import solve
 from pipeline.store.bundle import read_bundle
+from pipeline.store.creep import CreepRecord
 from pipeline.store.experiment import Experiment
 from pipeline.store.new import Contents, first_experiment, write_bundle
 from pipeline.store.sections import PixelFrame
-from pipeline.study.assembly import build_model
+from pipeline.study.assembly import CREEPING, build_model
 from pipeline.study.observation import observe_solution
 
 RADIUS_MM = 2.0
@@ -44,18 +45,19 @@ def labels_of_one_stone() -> tuple[np.ndarray, PixelFrame]:
     return np.where(stone, 2, 1).astype(np.uint8), PixelFrame(mm_per_px=0.5, origin_px=(137.0, 120.0))
 
 
-def make_bundle(folder: Path, seed: int = 0) -> Path:
-    """Simulate the truth once, add noise, write the bundle: record, fields and label image."""
+def make_bundle(folder: Path, seed: int = 0, creep: CreepRecord | None = None) -> Path:
+    """Simulate the truth once, add noise, write the bundle; with a creep record the mastic of the truth creeps."""
     labels, frame = labels_of_one_stone()
     experiment = coarse_experiment(folder.name)
     specimen = experiment.specimen.model_copy(update={"image": frame})
     experiment = experiment.model_copy(update={"specimen": specimen})
-    write_bundle(folder, experiment, Contents(labels=labels))
+    write_bundle(folder, experiment, Contents(labels=labels, creep=creep))
     frames = np.arange(0.01, CMOD_MAX_MM, 0.01) * MM
-    problem = build_model(read_bundle(folder)).problem(F_MAX, DELTA_MAX, frames=frames)
+    problem = build_model(read_bundle(folder)).problem(F_MAX, DELTA_MAX, frames=frames, law=creep and CREEPING)
     solution = solve(problem)
     field = _noisy_field(problem, solution, np.random.default_rng(seed))
-    write_bundle(folder, experiment, Contents(curve=_record(solution.curve), fields=field, labels=labels))
+    contents = Contents(curve=_record(solution.curve), fields=field, labels=labels, creep=creep)
+    write_bundle(folder, experiment, contents)
     return folder
 
 
