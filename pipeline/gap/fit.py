@@ -14,6 +14,7 @@ from pipeline.gap.metric import Metric
 STEP = 1e-3  # of the box, and of an amplitude's scale: central differences
 COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH standard deviations
 STARTS = 3  # nodes along each of two or more amplitudes, to start from
+FAR = np.array([6.0, 7.0, 8.0, 10.0, 13.0, 18.0, 25.0])  # further nodes, for tempered likelihoods
 CHORDS, SETTLED = 8, 1e-2  # steps of the parameters at a node, until χ² falls by less
 RULER = {2: 15, 3: 7}  # nodes along each principal axis of so many amplitudes; 5 of more
 
@@ -56,6 +57,7 @@ class Fitted:
     log_evidence : float; natural logarithm of ∫∫ likelihood × prior, without the constant that all share
     nodes : (j, k) array; amplitudes
     weights : (j,) array, sum 1; their posterior, the parameters integrated out
+    log_measure : (j,) array; logarithm of prior density × length or area that a node stands for
     jacobian : (n, q + k) array; white derivatives of the prediction at the best point
     residual : (n,) array; white
     at_edge : bool; the parameters lie on the edge of their box
@@ -68,19 +70,29 @@ class Fitted:
     log_evidence: float
     nodes: np.ndarray
     weights: np.ndarray
+    log_measure: np.ndarray
     jacobian: np.ndarray
     residual: np.ndarray
     at_edge: bool
 
-    def values(self) -> np.ndarray:
+    def values(self, temperature: float = 1.0) -> np.ndarray:
         """Posterior mean of every effect's value; (effects,)."""
-        return self.weights @ self.candidate.values(self.nodes)
+        return self.tempered(temperature) @ self.candidate.values(self.nodes)
 
-    def interval(self, share: float = 0.95) -> np.ndarray:
+    def interval(self, share: float = 0.95, temperature: float = 1.0) -> np.ndarray:
         """Bounds (effects, 2) between which the values lie with this probability."""
-        values = self.candidate.values(self.nodes)
+        values, weights = self.candidate.values(self.nodes), self.tempered(temperature)
         tail = (1 - share) / 2
-        return np.array([_quantiles(v, self.weights, (tail, 1 - tail)) for v in values.T]).reshape(-1, 2)
+        return np.array([_quantiles(v, weights, (tail, 1 - tail)) for v in values.T]).reshape(-1, 2)
+
+    def tempered(self, temperature: float) -> np.ndarray:
+        """The weights (j,) when the likelihood counts only to the power of 1/temperature."""
+        if temperature == 1:
+            return self.weights
+        log_likelihood = np.log(np.maximum(self.weights, 1e-300)) - self.log_measure
+        log_weight = log_likelihood / temperature + self.log_measure
+        weight = np.exp(log_weight - log_weight.max())
+        return weight / weight.sum()
 
 
 def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fitted:
@@ -100,7 +112,8 @@ def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fi
     at, square, jacobian, residual = best
     nodes, log_area = _nodes(candidate, data, best)
     profiles = np.array([_profile(candidate, data, best, node) for node in nodes])
-    log_posterior = profiles + candidate.log_prior(nodes) + log_area
+    log_measure = candidate.log_prior(nodes) + log_area
+    log_posterior = profiles + log_measure
     total = float(logsumexp(log_posterior))
     q = len(data.box)
     return Fitted(
@@ -111,6 +124,7 @@ def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fi
         log_evidence=total - float(np.log(data.width).sum()),
         nodes=nodes,
         weights=np.exp(log_posterior - total),
+        log_measure=log_measure,
         jacobian=jacobian,
         residual=residual,
         at_edge=bool(np.any(np.abs(at[:q, None] - data.box) < 1e-6 * data.width[:, None])),
@@ -231,7 +245,8 @@ def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, n
     covariance = (np.linalg.inv(scaled.T @ scaled + np.diag(prior)) * np.outer(unit, unit))[q:, q:]
     if k == 1:
         low, high = candidate.bounds[0]
-        fine = at[q] + REACH * np.sqrt(covariance[0, 0]) * np.linspace(-1, 1, FINE)
+        ruler = np.concatenate([REACH * np.linspace(-1, 1, FINE), FAR, -FAR])
+        fine = at[q] + np.sqrt(covariance[0, 0]) * ruler
         line = np.unique(np.concatenate([np.linspace(low, high, COARSE), fine[(fine > low) & (fine < high)], at[q:]]))
         return line[:, None], np.log(np.maximum(np.gradient(line) * _ends(line.size), 1e-300))
     strength, shape = np.linalg.eigh(covariance)

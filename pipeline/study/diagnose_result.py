@@ -77,8 +77,8 @@ def _finite(value: float) -> float | None:
 
 def estimate(d: Diagnosis, name: str) -> dict[str, Any]:
     """How large an effect is if it is the only one."""
-    fitted = d.fits[name]
-    [value], [interval] = fitted.values(), fitted.interval()
+    fitted, temperature = d.fits[name], d.scored.temperature
+    [value], [interval] = fitted.values(temperature), fitted.interval(temperature=temperature)
     return {"value": float(value), "unit": effect(name).magnitude.unit, "interval_95": interval.tolist()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -81,10 +81,15 @@ def make_library(
     domain = Domain(geometry, (0.75 * radius, 1.5 * radius), _last(specimens), NOISE)
     entry, check = learnt(specimens, domain)
     told = {"version": __version__, "engine": ENGINE, "seeds": list(seeds), "pitch": "1.9 radii, irregular"}
-    write_atomically(file, written([replace(entry, check=check)], told).encode())
+    write_atomically(file, written([replace(entry, check=check, temperature=uncalibrated(check))], told).encode())
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
         f"{mode} {value:.2f}" for mode, value in check.items()
     )
+
+
+def uncalibrated(check: Mapping[str, float]) -> float:
+    """The temperature until blind tests give a better one: what the worst mode of left-out specimens asks for."""
+    return max(1.0, *check.values())
 
 
 def one_specimen(

@@ -43,6 +43,15 @@ def test_the_posterior_of_a_linear_effect_is_the_exact_one():
     assert (high - low) / 2 == pytest.approx(1.96 * std, rel=0.03)  # quantiles between nodes 0.42 std apart
 
 
+def test_temper_widens_the_interval_by_its_root():
+    base, column, sigma, target = scene(3, 2.0)
+    flat = Magnitude(-50.0, 50.0, 1e6, "1")  # the prior has no say
+    found = fit(candidate(base, "x", column, flat), data(target, sigma))
+    (low, high), (lower, higher) = found.interval()[0], found.interval(temperature=2.5)[0]
+    assert (higher - lower) / (high - low) == pytest.approx(np.sqrt(2.5), rel=0.03)  # nodes reach 3.2 wider deviations
+    assert found.values(2.5)[0] == pytest.approx(found.values()[0], abs=1e-3 * (high - low))
+
+
 def test_two_effects_at_once_have_the_exact_evidence():
     base, column, sigma, target = scene(5, 1.0)
     other = np.random.default_rng(9).normal(size=column.size)
