@@ -31,19 +31,19 @@ inline const Pair2 &pair(const double *p)
   return *reinterpret_cast<const Pair2 *>(p);
 }
 
-// angle of a turned vector from its product with the vector before: a short series for what is usual
-inline double angle(double cross, double dot)
+// how far a bond has turned (tan of it: cross/dot) beyond its ends, nearest to none
+__attribute__((noinline, cold)) double turned_far(double cross, double dot, double mean)
 {
-  const double t = cross / dot, q = t * t;
-  if (!(dot > 0.0 && q < 2.5e-3)) return std::atan2(cross, dot);
-  return t * (1.0 + q * (-1.0 / 3 + q * (1.0 / 5 + q * (-1.0 / 7 + q * (1.0 / 9 - q * (1.0 / 11))))));
+  const double more = std::atan2(cross, dot) - mean;
+  return std::fabs(more) < M_PI ? more : std::remainder(more, 2.0 * M_PI);
 }
 
-// by how much a bond has turned more than its ends: nearest to none
+// the same by a short series, to the last bit for turns up to 0.01
 inline double turned(double cross, double dot, double mean)
 {
-  const double more = angle(cross, dot) - mean;
-  return std::fabs(more) < M_PI ? more : std::remainder(more, 2.0 * M_PI);
+  const double t = cross / dot, q = t * t;
+  if (__builtin_expect(!(dot > 0.0 && q < 1e-4 && std::fabs(mean) < 1.0), 0)) return turned_far(cross, dot, mean);
+  return t - t * q * (1.0 / 3 - q * (1.0 / 5 - q * (1.0 / 7 - q * (1.0 / 9)))) - mean;
 }
 
 inline cohesive::MixedState mixed_state(const double *row)
