@@ -21,7 +21,7 @@ from pipeline.cli import app
 from pipeline.equilibrium.path import Increments
 from pipeline.explicit import loading
 from pipeline.store.fields import read_fields
-from pipeline.study import cross_check, dic, identify, model, observation, simulate, virtual_test
+from pipeline.study import cross_check, diagnose_result, dic, identify, model, observation, simulate, virtual_test
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
@@ -152,6 +152,8 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
         dic.dic_result,
         cross_check._result,
         cross_check._run_result,
+        diagnose_result.diagnosis_result,
+        diagnose_result.closure_result,
     ],
 )
 def test_every_key_of_a_result_is_explained(function):
