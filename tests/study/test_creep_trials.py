@@ -1,0 +1,25 @@
+"""Trials with creep in the truth: the mastic that is used, and the table."""
+
+import pytest
+
+from pipeline.study.creep_trials import MASTIC, READINGS, CreepTrial, creep_table
+
+
+def test_the_mastic_creeps_by_what_is_said_of_it():
+    at_once, early, late = MASTIC.creep_compliance([0.0, 5.0, 60.0])
+    assert 1 / at_once == pytest.approx(10e9)
+    assert early / at_once == pytest.approx(1.147, abs=1e-3)
+    assert late / at_once == pytest.approx(1.793, abs=1e-3)
+    assert READINGS[0] < 5 < 60 < READINGS[-1]  # what decides is inside the record
+
+
+def test_medians_stand_at_the_foot_of_each_geometry():
+    trials = [
+        CreepTrial("seb, seed 1", (1.10, 0.95), (1.00, 1.01), (True, True)),
+        CreepTrial("seb, seed 2", (1.30, 0.93), (1.02, 0.99), (True, False)),
+        CreepTrial("dct, seed 1", (1.05, 0.99), (1.00, 1.00), (True, True)),
+    ]
+    table = creep_table(trials)
+    assert "| seb, seed 2 | +30.0% | -7.0% | +2.0% | -1.0% | yes, no | +27.5% |" in table
+    assert "| **median, seb** | +20.0% | -6.0% | +1.0% | +0.0% | | +18.7% |" in table
+    assert "| **median, dct** | +5.0% | -1.0% | +0.0% | +0.0% | | +5.0% |" in table
