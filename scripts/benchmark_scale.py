@@ -1,5 +1,4 @@
 """Cost of a step of LAMMPS against particles and ranks, as ratios of neighbours in one run.
-
 usage: python scripts/benchmark_scale.py [RADII in mm, as in 1.2,0.6,0.3] [RANKS, as in 1,2] [STEPS at 0.3 mm]
 """
 
@@ -17,8 +16,8 @@ from pipeline.study.specimens import section_trial
 
 def seconds(folder: Path, count: int, steps: int) -> float:
     """Time of one step on that many ranks, from the loop time in the log."""
-    deck = (folder / DECK).read_text()
-    (folder / DECK).write_text(re.sub(r"run +(\$\{steps_max\} upto|\d+)\n", f"run {steps}\n", deck))
+    deck = re.sub(r"run +(\$\{steps_max\} upto|\d+)\n", f"run {steps}\n", (folder / DECK).read_text())
+    (folder / DECK).write_text(deck)
     ranks.run(folder, count)
     return float(re.findall(r"Loop time of (\S+)", (folder / "log.lammps").read_text())[0]) / steps
 

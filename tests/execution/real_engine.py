@@ -24,7 +24,7 @@ from pipeline.store.simulation import SimulationStore
 
 def problems(count: int) -> dict[str, Problem]:
     """Small beams of different strength, by key."""
-    beam = small_beam(2e-3, accuracy=0.005)
+    beam = small_beam(2e-3, accuracy=0.002)
     laws = [replace(beam.law, f_max=factor * beam.law.f_max) for factor in np.linspace(0.9, 1.1, count)]
     return {problem_key(problem, "kills"): problem for problem in map(beam.with_law, laws)}
 
