@@ -66,7 +66,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 def test_a_killed_worker_is_reported_and_its_simulation_tried_again(cluster: Cluster, tmp_path: Path) -> None:
-    wanted = {f"key{n}": Task(n, tmp_path, seconds=1.0) for n in range(5)}
+    wanted = {f"key{n}": Task(n, tmp_path, seconds=0.5) for n in range(5)}
     killed: list[int] = []
 
     def kill_one_in_the_middle() -> None:

@@ -16,7 +16,7 @@ import pytest
 from execution.real_engine import problems
 from helpers.commands import workers
 
-COUNT = 30
+COUNT = 45
 CLOCK = ("seconds",)
 
 
