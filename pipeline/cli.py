@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
+from pipeline.cli_blind_check import blind_check
 from pipeline.cli_cluster import collect, export
 from pipeline.cli_diagnose import diagnose
 from pipeline.cli_library import library
@@ -59,6 +60,7 @@ from pipeline.terminal import Display, exit_codes, finish
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(library, name="library")
+app.add_typer(blind_check, name="blind-check")
 app.command()(diagnose)
 app.command()(export)
 app.command()(collect)

@@ -20,11 +20,12 @@ FLOORS = {
     4: {"lmp", "reference", "equilibrium", "twin", "blind"},
     5: {"store", "config", "report", "execution", "hpc"},
     6: {"study"},
-    7: {"cli", "cli_cluster", "cli_diagnose", "cli_library", "options", "terminal", "__main__"},
+    7: {"cli", "cli_blind_check", "cli_cluster", "cli_diagnose", "cli_library", "options", "terminal", "__main__"},
 }
 ROOMS = {room: floor for floor, rooms in FLOORS.items() for room in rooms}
 FACE = {
     "cli",
+    "cli_blind_check",
     "cli_cluster",
     "cli_diagnose",
     "cli_library",

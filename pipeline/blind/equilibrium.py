@@ -21,7 +21,9 @@ CAUTIOUS = 0.3, 0.02  # shares of the softening left out of the tangent after ba
 FIRST_STEP, STEPS = 4e-6, 55  # m of CMOD before and around the peak; steps of the rest
 FINE_UNTIL = 60e-6  # m of CMOD
 SMALLEST = 1 / 64  # of a step
-SLOWEST = 1e-3  # of the rate of the mouth: slower openings count as this
+LEAST, PATIENCE = 0.05, 6  # of the wanted step: an increment that opens less rests; so many may follow each other
+SLOWEST = 1e-2  # of the rate of the mouth: slower openings count as this
+RAMP = 0.1  # of the softening branch, over which the rate law sets in
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +206,7 @@ def solve(setup: Setup, cmod_max: float) -> Path:
     """
     state = State(0.0, np.zeros(setup.body.size), setup.spent, setup.bulk.fresh(), np.zeros(len(setup.spent)))
     states, total, stretch = [state], 0, _first_stretch(setup)
-    before = np.zeros(setup.body.size)
+    before, resting = np.zeros(setup.body.size), 0
     while setup.machine.cmod(states[-1].moved) < cmod_max:
         state, share = states[-1], 1.0
         wanted = _wanted(setup.machine.cmod(state.moved), cmod_max)
@@ -219,12 +221,14 @@ def solve(setup: Setup, cmod_max: float) -> Path:
                         f"at a CMOD of {setup.machine.cmod(state.moved) * 1e3:.3g} mm {error}"
                     ) from error
         opened = setup.machine.cmod(new.moved) - setup.machine.cmod(state.moved)
-        if opened <= 0.05 * share * wanted:
+        resting = 0 if opened > LEAST * share * wanted else resting + 1
+        if resting > PATIENCE:
             raise ConvergenceError(
                 f"the mouth does not open further at a CMOD of {setup.machine.cmod(state.moved) * 1e3:.3g} mm: the "
                 "test snaps back under a moving platen"
             )
-        stretch, before = (new.machine - state.machine) / opened, (new.moved - state.moved) / opened
+        if not resting:
+            stretch, before = (new.machine - state.machine) / opened, (new.moved - state.moved) / opened
         states.append(new)
         total += count
     return _path(setup, states, total)
@@ -263,6 +267,7 @@ def _advance(setup: Setup, state: State, cmod: float, machine: float, guess: np.
     load = 0.5 * (setup.machine.load(moved, place) + setup.machine.load(state.moved, state.machine))
     work = state.work + load * machine + float(rubbing @ (moved - state.moved))
     rate = np.maximum(now - edges.effective(body.opening(state.moved)), 0.0) / span
+    rate = 0.7 * state.opening_rate + 0.3 * rate  # of the last few increments: one alone would swing
     memory = setup.bulk.remember(body, state.memory, moved - state.moved, span)
     reached = np.maximum(state.reached, now)
     return replace(
@@ -276,13 +281,15 @@ def _at_rate(setup: Setup, state: State) -> Edges:
     if not setup.rate_law:
         return setup.edges
     decades = np.log10(np.maximum(state.opening_rate / setup.cmod_rate, SLOWEST))
-    softening = state.reached > setup.edges.first
-    factor = np.where(softening, 1 + setup.rate_law * decades, 1.0)
+    begun = np.minimum(setup.edges.way(state.reached) / RAMP, 1.0)  # no jump where softening begins
+    factor = 1 + setup.rate_law * decades * begun
     return replace(setup.edges, strength=setup.edges.strength * np.maximum(factor, 0.05))
 
 
 def _path(setup: Setup, states: list[State], iterations: int) -> Path:
     body, machine, end = setup.body, setup.machine, states[-1]
+    opened = np.maximum.accumulate([machine.cmod(s.moved) for s in states])
+    states = [s for s, new in zip(states, np.diff(opened, prepend=-1.0) > 0, strict=True) if new]
     lost = setup.edges.dissipated(end.reached) - setup.edges.dissipated(setup.spent)
     kept = setup.edges.stored(body.opening(end.moved), end.reached) @ body.weight
     bulk = setup.bulk.stored(body, end.memory, end.moved)

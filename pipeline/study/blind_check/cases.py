@@ -1,0 +1,179 @@
+"""Which cases a blind check holds: effects × multiples of their detection limits × specimens × noise, and controls."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.gap.effects import effect, library
+
+MULTIPLES = (0.5, 1.0, 2.0, 4.0)
+LIMIT = 0.5  # of the scale of an effect's prior: its detection limit where none is given
+NOISE = {"low": (0.005, 5.0), "high": (0.02, 15.0)}  # of displacement (px of 0.0439 mm) and load (N)
+ONLY_BEAMS = ("eccentricity_mm",)
+STRANGERS = {"aggregate_modulus": -0.5, "gauge_length": 0.5}  # no library has them; relative change
+DECOYS = 2  # effects that are left out although they are not there, wherever something is left out
+
+
+@dataclass(frozen=True)
+class Case:
+    """One sealed test.
+
+    Parameters
+    ----------
+    name : str; says nothing
+    specimen : int; number of the specimen, replicates share it
+    geometry : str
+    effects : name → value; of the library
+    stranger : (name, value) or None; an effect that no library has
+    kind : "none", "effect", "pair" or "outside"
+    multiple : float; of the detection limit, after the cap
+    noise : key of `NOISE`
+    images : bool; speckle images instead of fields
+    without : effects that the library of this diagnosis must do without
+    """
+
+    name: str
+    specimen: int
+    geometry: str
+    effects: Mapping[str, float]
+    kind: str
+    multiple: float = 0.0
+    noise: str = "low"
+    images: bool = False
+    without: tuple[str, ...] = ()
+    stranger: tuple[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a check is.
+
+    Parameters
+    ----------
+    radius_mm : float; of the diagnosing lattice
+    edge_mm : float; of the triangles
+    specimens : geometry of each specimen
+    frames : int
+    camera_mm_per_px : float; of speckle images
+    cmod_max_mm : float
+    """
+
+    radius_mm: float
+    edge_mm: float
+    specimens: tuple[str, ...]
+    frames: int
+    camera_mm_per_px: float
+    cmod_max_mm: Mapping[str, float] = field(default_factory=lambda: {"seb": 0.55, "dct": 0.6})
+
+
+SIZES = {
+    "small": Size(1.5, 3.0, ("seb", "seb"), 25, 0.09),
+    "full": Size(0.6, 1.2, ("seb", "seb", "seb", "seb", "dct", "dct"), 61, 0.0439),
+}
+# small: what each of the twelve cases is, in the order of the library's kinds
+SMALL = (
+    (), (), (("load_gain", 4.0),), (("drift_um_per_min", 4.0),), (("magnification", 4.0),), (("cmod_gain", 2.0),),
+    (("modulus", 4.0),), (("notch_length_mm", 4.0),), (("tip_damage", 2.0),), (("lens_distortion", 4.0),),
+    (("load_gain", 4.0), ("modulus", 4.0)),
+)  # fmt: skip
+
+
+def limits_of(file: Path | None) -> dict[str, float]:
+    """Detection limit of every effect: of the result.json of a diagnosis, or shares of the priors.
+
+    Raises
+    ------
+    InputError
+        where the file holds none
+    """
+    found = {name: LIMIT * one.magnitude.scale for name, one in library().items()}
+    if file is None:
+        return found
+    try:
+        given = json.loads(Path(file).read_text("utf-8"))["detection_limit"]
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{file} holds no detection limits ({error}): give the result.json of a diagnosis") from error
+    return found | {n: float(row["value"]) for n, row in given.items() if n in found and row["value"]}
+
+
+def sized(name: str, multiple: float, limits: Mapping[str, float], sign: float) -> tuple[float, float]:
+    """Value of an effect at a multiple of its limit, capped at the plausible maximum, and the multiple it then is."""
+    range_ = effect(name).magnitude
+    downwards = sign < 0 and range_.low < 0
+    most = -range_.low if downwards else range_.high
+    value = min(multiple * limits[name], most)
+    return (-value if downwards else value), value / limits[name]
+
+
+def drawn_cases(size: str, limits: Mapping[str, float], rng: np.random.Generator) -> list[Case]:
+    """The cases of a check, in random order under names that say nothing."""
+    chosen = SIZES[size]
+    rows = _small(limits, rng) if size == "small" else _full(limits, rng)
+    rows = [rows[k] for k in rng.permutation(len(rows)).tolist()]
+    filmed = set(rng.choice(len(rows), -(-len(rows) // 5), replace=False).tolist())
+    cases = []
+    for number, row in enumerate(rows):
+        specimen = row.pop("specimen", None)
+        specimen = int(rng.integers(len(chosen.specimens))) if specimen is None else specimen
+        cases.append(
+            Case(
+                name=f"case-{number:04d}",
+                specimen=specimen,
+                geometry=chosen.specimens[specimen],
+                images=number in filmed,
+                **row,
+            )
+        )
+    return cases
+
+
+def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
+    sizes = {n: sized(n, m, limits, rng.choice([-1.0, 1.0])) for n, m in names}
+    kind = ("none", "effect", "pair")[len(names)]
+    reached = min((m for _, m in sizes.values()), default=0.0)
+    return {"effects": {n: v for n, (v, _) in sizes.items()}, "kind": kind, "multiple": reached}
+
+
+def _left_out(row: dict[str, Any], hidden: bool, rng: np.random.Generator) -> dict[str, Any]:
+    """The row with a library that lacks some effects: its own, or only others."""
+    others = [n for n in library() if n not in row["effects"]]
+    names = [*rng.choice(others, DECOYS, replace=False).tolist(), *(row["effects"] if hidden else ())]
+    return row | {"without": tuple(sorted(names)), "kind": "outside" if hidden else row["kind"]}
+
+
+def _small(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
+    rows = [_row(names, limits, rng) for names in SMALL]
+    rows.append(_left_out(_row((("load_gain", 4.0),), limits, rng), True, rng))
+    rows[2] = _left_out(rows[2], False, rng)
+    return rows
+
+
+def _full(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    geometries = SIZES["full"].specimens
+    for name in library():
+        for multiple in MULTIPLES:
+            for noise in NOISE:
+                allowed = [k for k, g in enumerate(geometries) if g == "seb" or name not in ONLY_BEAMS]
+                row = _row(((name, multiple),), limits, rng) | {"noise": noise, "specimen": int(rng.choice(allowed))}
+                rows.append(_left_out(row, False, rng) if rng.uniform() < 0.2 else row)
+        hidden = _row(((name, 5.0),), limits, rng) | {"specimen": int(rng.choice(allowed))}
+        rows.append(_left_out(hidden, True, rng))
+    for specimen in range(len(geometries)):
+        for noise in NOISE:
+            row = _row((), limits, rng) | {"noise": noise, "specimen": specimen}
+            rows += [row, _left_out(dict(row), False, rng)]
+        for name, value in STRANGERS.items():
+            rows.append(_row((), limits, rng) | {"kind": "outside", "stranger": (name, value), "specimen": specimen})
+    names = [n for n in library() if n not in ONLY_BEAMS]
+    for _ in range(2 * len(geometries)):
+        pair = tuple((str(n), 4.0) for n in rng.choice(names, 2, replace=False))
+        rows.append(_row(pair, limits, rng))
+    return rows

@@ -1,0 +1,129 @@
+"""Diagnose every sealed bundle and seal the verdicts before anybody opens the truth."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline import __version__
+from pipeline.core.errors import InputError, PipelineError, StoreError
+from pipeline.execution.progress import Progress, Silent
+from pipeline.store.atomic import write_atomically
+from pipeline.store.results import RESULT, plain, prepare_output
+from pipeline.study.blind_check.seal import (
+    BUNDLES,
+    OPENED,
+    PLAN,
+    SEAL,
+    VERDICT_SEAL,
+    VERDICTS,
+    canonical,
+    code_digest,
+    digest,
+    file_digests,
+    read_json,
+)
+
+DIAGNOSE = "pipeline.study.diagnose:diagnose"
+DIAGNOSES, SIMULATIONS, SCRATCH = "diagnoses", "simulations", "scratch"
+
+
+def run(
+    out: Path, *, diagnose: str = DIAGNOSE, seed: int = 0, prefix: Sequence[str] = (), progress: Progress | None = None
+) -> str:
+    """Diagnose the bundles of OUT, each in a process of its own; goes on where it stopped; then seals.
+
+    Parameters
+    ----------
+    out : folder of `make`, or with bundles/, plan.json (optional) and seal.json of another program
+    diagnose : "module:function" with the signature of `study.diagnose.diagnose`
+    seed : of the diagnoses
+    prefix : words before the command of every process, such as a tracer's
+
+    Raises
+    ------
+    InputError
+        where the truth was opened already
+    StoreError
+        where the bundles are not the sealed ones
+    """
+    out, progress = Path(out).resolve(), progress or Silent()
+    if (out / OPENED).exists():
+        raise InputError(f"{out} was opened: verdicts after that are worth nothing; make a new check with another seed")
+    seal = read_json(out / SEAL)
+    if file_digests(out / BUNDLES) != seal["bundles_sha256"]:
+        raise StoreError(f"the bundles of {out} are not those that were sealed: make the check again")
+    plan = read_json(out / PLAN) if (out / PLAN).exists() else {}
+    names = sorted(path.name for path in (out / BUNDLES).iterdir() if path.is_dir())
+    done = [name for name in names if _found(out, name) is not None]
+    progress.stage(f"diagnosing {len(names)} sealed bundles")
+    progress.begin(len(names), len(done), "diagnosis")
+    for name in names:
+        if name not in done:
+            failure = _diagnosed(out, name, plan.get(name, {}).get("without", ()), diagnose, seed, prefix)
+            if failure is None:
+                progress.done(name)
+            else:
+                progress.failed(name, PipelineError(failure))
+    return _sealed(out, names)
+
+
+def _found(out: Path, name: str) -> dict[str, Any] | None:
+    path = out / DIAGNOSES / name / RESULT
+    return read_json(path) if path.exists() else None
+
+
+def _diagnosed(
+    out: Path, name: str, without: Sequence[str], diagnose: str, seed: int, prefix: Sequence[str]
+) -> str | None:
+    """Run one diagnosis; why it failed, or None."""
+    folder = prepare_output(out / DIAGNOSES / name)
+    shared = folder / SIMULATIONS
+    if not shared.exists():  # tests of one specimen at the same stations share their simulations
+        prepare_output(out / SIMULATIONS)
+        shared.symlink_to(out / SIMULATIONS, target_is_directory=True)
+    scratch = str(prepare_output(out / SCRATCH))
+    command = [
+        *prefix, sys.executable, "-m", "pipeline.study.blind_check.guard", str(out), str(out / BUNDLES / name),
+        str(folder), str(seed), ",".join(without), diagnose,
+    ]  # fmt: skip
+    root = str(Path(__file__).resolve().parents[3])
+    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    settings = {"TMPDIR": scratch, "MPLCONFIGDIR": scratch, "HOME": scratch, "PYTHONPATH": paths, "MPLBACKEND": "Agg"}
+    settings["PYTHONDONTWRITEBYTECODE"] = "1"
+    ended = subprocess.run(command, cwd=out, env=os.environ | settings, capture_output=True, text=True, check=False)
+    write_atomically(folder / "log.txt", (ended.stdout + ended.stderr).encode())
+    if ended.returncode == 0 and (folder / RESULT).exists():
+        return None
+    told = ended.stderr.strip().splitlines()
+    return told[-1] if told else f"the process ended with {ended.returncode} and no result"
+
+
+def _sealed(out: Path, names: Sequence[str]) -> str:
+    """Write all verdicts into one file, and its digest with the code's beside it."""
+    found = {name: _found(out, name) for name in names}
+    missing = [name for name, result in found.items() if result is None]
+    failed = {name: _why(out, name) for name in missing}
+    content = canonical({"verdicts": {n: r for n, r in found.items() if r is not None}, "failed": failed})
+    write_atomically(out / VERDICTS, content)
+    seal = {
+        "verdicts_sha256": digest(content),
+        "seal_sha256": digest((out / SEAL).read_bytes()),
+        "version": __version__,
+        "code_sha256": code_digest(),
+        "sealed": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }
+    write_atomically(out / VERDICT_SEAL, canonical(plain(seal)))
+    told = f"; {len(missing)} failed: {', '.join(missing)} (logs in {DIAGNOSES})" if missing else ""
+    return f"{len(names) - len(missing)} verdicts sealed{told}"
+
+
+def _why(out: Path, name: str) -> str:
+    log = out / DIAGNOSES / name / "log.txt"
+    lines = log.read_text("utf-8", errors="replace").strip().splitlines() if log.exists() else []
+    return lines[-1] if lines else "it was not run"
