@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,7 +22,8 @@ class Discrepancy:
 
     Mode i has at CMOD c the standard deviation aᵢ(c), linear in log c between the stages and in c before the first;
     Cov(bᵢ(c), bⱼ(c')) = aᵢ(c) aⱼ(c') Rᵢⱼ exp(−|c − c'|/length). The load counts in shares of its largest value. What
-    the modes leave is correlated alike along the CMOD, over `spread` on one flank, and not across the crack.
+    the modes leave is correlated alike along the CMOD, over `spread` on one flank, and not across the crack. Bonds that
+    snap one by one move single points at single stations: `white`.
 
     Parameters
     ----------
@@ -32,6 +33,7 @@ class Discrepancy:
     length : float, m of CMOD
     spread : float, m
     samples : int; specimens it was learnt from
+    white : (3,) array, m; independent scatter of every displacement component in the stages
     """
 
     amplitude: np.ndarray
@@ -40,6 +42,7 @@ class Discrepancy:
     length: float
     spread: float = SPREAD
     samples: int = 1
+    white: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         k = len(ALL)
@@ -55,14 +58,16 @@ class Discrepancy:
         size = np.stack([along_cmod(a, sight.progress) for a in self.amplitude])
         basis = shapes(sight).reshape(2 * p, len(MODES))
         root = self.correlation[:-1, :-1]
-        field = np.einsum("ai,is,ij,jt,bj,st->satb", basis, size[:-1], root, size[:-1], basis, along, optimize=True)
+        fields = np.einsum("ai,is,ij,jt,bj,st->satb", basis, size[:-1], root, size[:-1], basis, along, optimize=True)
         local = along_cmod(self.remainder, sight.progress)
         flank = np.kron(flank_correlation(sight, self.spread), np.eye(2))
-        field += np.einsum("s,t,st,ab->satb", local, local, along, flank, optimize=True)
+        fields += np.einsum("s,t,st,ab->satb", local, local, along, flank, optimize=True)
         mixed = np.einsum("ai,is,i,t,st->sat", basis, size[:-1], self.correlation[:-1, -1], size[-1], along)
         cut = 2 * s * p
         found = np.zeros((cut + s, cut + s))
-        found[:cut, :cut] = field.reshape(cut, cut)
+        found[:cut, :cut] = fields.reshape(cut, cut) + np.diag(
+            np.repeat(along_cmod(self.white, sight.progress) ** 2, 2 * p)
+        )
         found[:cut, cut:] = load_scale * mixed.reshape(cut, s)
         found[cut:, :cut] = found[:cut, cut:].T
         found[cut:, cut:] = load_scale**2 * np.outer(size[-1], size[-1]) * along

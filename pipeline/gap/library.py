@@ -130,6 +130,7 @@ def _entry(raw: Mapping[str, Any]) -> Entry:
         raw["length_mm"] * MM,
         raw["spread_mm"] * MM,
         raw["samples"],
+        np.array(raw["white_um"]) * UM,
     )
     return Entry(domain, discrepancy, raw["temperature"], raw["tests"], raw["check"])
 
@@ -153,6 +154,7 @@ def _raw(entry: Entry) -> dict[str, Any]:
         "amplitude_load": np.round(x.amplitude[-1], 6).tolist(),
         "correlation": np.round(x.correlation, 4).tolist(),
         "remainder_um": np.round(x.remainder / UM, 4).tolist(),
+        "white_um": np.round(x.white / UM, 4).tolist(),
         "length_mm": round(x.length / MM, 4),
         "spread_mm": x.spread / MM,
         "samples": x.samples,

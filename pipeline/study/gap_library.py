@@ -33,6 +33,7 @@ from pipeline.study.virtual_test import virtual_test
 
 FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
+QUIET = 1.5  # Σ over noise, below which a direction says what scatter there is beside the waves
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
 
 
@@ -140,8 +141,38 @@ def learnt(specimens: Sequence[Specimen], domain: Domain) -> tuple[Entry, dict[s
 def _iterated(specimens: Sequence[Specimen], domain: Domain) -> Entry:
     entry = Entry(domain, assumed(), 1.0, 0, {})
     for _ in range(TURNS):
-        entry = replace(entry, discrepancy=learn([remnant(s, entry) for s in specimens]))
+        learnt_now = learn([remnant(s, entry) for s in specimens])
+        entry = replace(entry, discrepancy=learnt_now)
+        entry = replace(entry, discrepancy=replace(learnt_now, white=_white([_heard(s, entry) for s in specimens])))
     return entry
+
+
+def _heard(specimen: Specimen, entry: Entry) -> np.ndarray:
+    """For every stage how many times noise the differences hold where the discrepancy says next to nothing; (3, 3).
+
+    Columns: sum of squares over noise, expected sum, and noise (m²). The directions are those in which Σ is less than
+    half again as large as noise.
+    """
+    rest = remnant(specimen, entry)
+    observation, data = weighed(specimen.observation, specimen.emulator, entry)
+    mask, p = observation.mask, len(observation.sight.points)
+    left, noise = rest.observation.reading.flat()[mask], observation.noise[mask]
+    stage = np.concatenate([np.repeat(observation.sight.stage, 2 * p), np.full(observation.sight.cmod.size, -1)])[mask]
+    found = np.zeros((3, 3))
+    for k in range(3):
+        here = stage == k
+        root = np.sqrt(noise[here])
+        size, shape = np.linalg.eigh(data.metric.part(here).covariance / np.outer(root, root))
+        quiet = size < QUIET
+        found[k] = np.sum((shape.T @ (left[here] / root))[quiet] ** 2), size[quiet].sum(), np.mean(noise[here])
+    return found
+
+
+def _white(heard: Sequence[np.ndarray]) -> np.ndarray:
+    """Independent scatter (3,), m, that makes the quiet directions as loud as they are."""
+    square, expected, noise = np.sum(heard, axis=0).T
+    excess = square / np.maximum(expected, 1e-9) - 1
+    return np.sqrt(np.maximum(excess, 0.0) * noise / len(heard))
 
 
 def _last(specimens: Sequence[Specimen]) -> float:
