@@ -91,13 +91,13 @@ def central_force_stiffness(modulus: Number, poissons_ratio: float, plane: Plane
     InputError
         if K^s < 0
     UnavailableError
-        if K^s > 0: shear springs need a rotation of the particles
+        if K^s > 0, which bonds that creep cannot have
     """
     ratio = stiffness_ratio(poissons_ratio, plane)
     if ratio > 0:
         raise UnavailableError(
             f"poissons_ratio = {poissons_ratio:g} in plane {plane} gives K^s/K^n = {ratio:.3g}: bonds with shear "
-            "stiffness need the rotation of the particles, which is not in this version; use poissons_ratio = 0.25 "
+            "stiffness cannot creep; use poissons_ratio = 0.25 "
             "(plane strain) or 0.3333 (plane stress)"
         )
     return normal_stiffness(modulus, poissons_ratio, plane, thickness)

@@ -113,6 +113,20 @@ def test_load_does_not_depend_on_how_it_is_run(
         assert other[name] == pytest.approx(record[name], abs=SAME * scale)
 
 
+@pytest.mark.parametrize("newton", ["on", "off"])
+def test_two_threads_begin_alike(beam: Problem, record: dict[str, np.ndarray], tmp_path: Path, newton: str) -> None:
+    """Each thread has particles of its own; only the order of sums is another."""
+    write_deck(tmp_path, beam)
+    deck = short((tmp_path / DECK).read_text()).replace("newton          on", f"newton          {newton}")
+    (tmp_path / DECK).write_text(deck)
+    run_deck(tmp_path, "-pk", "omp", "2")
+    other = read_curve(tmp_path / "curve.txt")
+    rows = other["step"].size
+    assert rows > 10
+    for name in ("load_n", "cmod_m", "stored_j"):
+        assert other[name] == pytest.approx(record[name][:rows], abs=SAME * np.abs(record[name]).max())
+
+
 def test_four_ranks_begin_alike(beam: Problem, record: dict[str, np.ndarray], tmp_path: Path) -> None:
     other = run_by_hand(tmp_path / "other", beam, 4, short)
     rows = other["step"].size
