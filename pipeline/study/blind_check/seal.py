@@ -133,6 +133,6 @@ def _fernet() -> Any:
         from cryptography.fernet import Fernet
     except ImportError as error:
         raise UnavailableError(
-            "blind-check needs the package cryptography to lock the truth: pip install 'cohesive-bpm[blind]'"
+            "blind-check needs the package cryptography to lock the truth: pip install cryptography"
         ) from error
     return Fernet
