@@ -60,6 +60,7 @@ def make_library(
     seeds: Sequence[int],
     geometry: str = "seb",
     radius_mm: float = 1.0,
+    temperature: float = 1.0,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> str:
@@ -71,6 +72,7 @@ def make_library(
     file : library to write
     seeds : of the virtual tests, at least four
     geometry, radius_mm : of the tests
+    temperature : float; the least that is written, where other effect-free tests ask for more than the left-out ones
     """
     progress = progress or Silent()
     specimens = []
@@ -82,7 +84,9 @@ def make_library(
     domain = Domain(geometry, (0.75 * radius, 1.5 * radius), _last(specimens), NOISE)
     entry, check = learnt(specimens, domain)
     told = {"version": __version__, "engine": ENGINE, "seeds": list(seeds), "pitch": "1.9 radii, irregular"}
-    write_atomically(file, written([replace(entry, check=check, temperature=uncalibrated(check))], told).encode())
+    write_atomically(
+        file, written([replace(entry, check=check, temperature=max(temperature, uncalibrated(check)))], told).encode()
+    )
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
         f"{mode} {value:.2f}" for mode, value in check.items()
     )
