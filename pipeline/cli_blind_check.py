@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from pipeline.options import Debug, Out, Seed, option
+from pipeline.options import Debug, Out, Seed, Workers, option
 from pipeline.terminal import Display, exit_codes, finish
 
 blind_check = typer.Typer(no_args_is_help=True, help="The sealed test of diagnose: make, run, open.")
@@ -31,13 +32,13 @@ def make(out: Out, size: Size = "small", limits: Limits = None, seed: Seed = Non
 
 
 @blind_check.command()
-def run(out: Out, seed: Seed = None, debug: Debug = False) -> None:
+def run(out: Out, workers: Workers = None, seed: Seed = None, debug: Debug = False) -> None:
     """Diagnose every sealed bundle, then seal the verdicts."""
     with exit_codes(debug):
         with Display() as progress:
             from pipeline.study.blind_check.run import run as judge
 
-            summary = judge(out, seed=seed or 0, progress=progress)
+            summary = judge(out, seed=seed or 0, workers=workers or os.cpu_count() or 1, progress=progress)
         finish(summary, out)
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay, cKDTree
 from pipeline.core.errors import PipelineError
 from pipeline.core.specimen import Specimen
 
-COARSEST, GROWTH = 3.0, 0.25  # largest edge over the finest; growth of the edge per distance from the zone
+COARSEST, GROWTH = 2.0, 0.25  # largest edge over the finest; growth of the edge per distance from the zone
 SMOOTHING = 25  # turns in which points move between their neighbours
 NEAREST = 0.55  # of the local edge: no point lies nearer to the boundary
 SHARP = 0.9  # cosine of the turn from which a corner is kept

@@ -26,6 +26,7 @@ HALF_ZONE = 18e-3  # m; edges farther from the notch line do not part (stresses 
 BEFORE_TIP = 9e-3  # m; of the zone, before the tip
 PENALTY = 300.0  # of E over edge length
 HURT = 3e-3  # m; damage before the test lies so near to the tip
+PLACES = 5  # along each side of a triangle, at which its phase is looked up
 VOID = (1.2e-3, 3.0e-3)  # m; diameters of unseen voids
 
 
@@ -176,6 +177,20 @@ def _phases(mesh: Mesh, phase_at: PhaseAt) -> tuple[np.ndarray, np.ndarray]:
     return np.where(phase == Phase.OUTSIDE, np.uint8(Phase.MASTIC), phase), stone
 
 
+def _stone_share(mesh: Mesh, phase_at: PhaseAt) -> np.ndarray:
+    """Share of stone in the solid of every triangle (t,), from places all over it."""
+    steps = (np.arange(PLACES) + 1 / 3) / PLACES
+    weights = np.array([(a, b, 1 - a - b) for a in steps for b in steps if a + b < 1])
+    corner = mesh.points[mesh.corners]
+    stone, solid = np.zeros(len(corner)), np.zeros(len(corner))
+    for weight in weights:
+        phase, _ = phase_at(np.einsum("c,tcx->tx", weight, corner))
+        stone += phase == Phase.AGGREGATE
+        solid += phase != Phase.VOID
+    share: np.ndarray = stone / np.maximum(solid, 1)
+    return share
+
+
 def _cut(mesh: Mesh, slit: np.ndarray) -> np.ndarray:
     """Which inner edges (e,) lie on the notch."""
     place = np.full(len(mesh.points), -10)
@@ -232,9 +247,14 @@ def _edges(
 
 
 def _bulk(body: Body, specimen: Specimen, material: Material, phase: np.ndarray, sample: Sample, zone: Zone) -> Bulk:
-    """Triangles; outside the zone unseen voids are too small for the mesh and make it softer (1 − φ)³."""
+    """Triangles; outside the zone unseen voids are too small for the mesh and make it softer (1 − φ)³.
+
+    A triangle that holds stone and mastic has them in series (Reuss 1929): constant strain makes coarse meshes too
+    stiff by itself, and the phase of the middle alone would add to that.
+    """
     stony = phase == Phase.AGGREGATE
-    modulus = np.where(stony, material.aggregate_modulus, material.mastic_modulus)
+    share = _stone_share(body.mesh, sample.phase_at)
+    modulus = 1 / ((1 - share) / material.mastic_modulus + share / material.aggregate_modulus)
     modulus = modulus * _warmth(sample, specimen, body.mesh.centre[:, 1], stony)
     porous = ~zone.holds(body.mesh.centre) & ~stony
     modulus = modulus * np.where(porous, (1 - sample.effect("air_voids")) ** 3, 1.0)
@@ -242,6 +262,6 @@ def _bulk(body: Body, specimen: Specimen, material: Material, phase: np.ndarray,
     if sample.effect("creep"):
         assert material.creep is not None
         d1, d2, eta1, tau2 = material.creep
-        share = sample.effect("creep")
-        relaxation = burgers_relaxation(d1, share * d2, eta1 / share, tau2)
+        share_out = sample.effect("creep")
+        relaxation = burgers_relaxation(d1, share_out * d2, eta1 / share_out, tau2)
     return Bulk(elasticity(material.poissons_ratio, material.plane), modulus, ~stony, relaxation)

@@ -72,7 +72,7 @@ def flip(path: Path, at: int = 3) -> None:
 
 
 def test_a_right_diagnosis_is_scored_right(sealed):
-    run(sealed, diagnose=FAKE)
+    run(sealed, diagnose=FAKE, workers=2)
     told = open_check(sealed, truth=sealed.parent / "truth.json")
     result = json.loads((sealed / "result.json").read_text())
     assert result["top1"]["value"] == 1.0
@@ -280,3 +280,16 @@ def test_engine_cs_tests_are_ordinary_bundles(tmp_path, monkeypatch):
     assert truth["cases"]["case-0001"]["effects"] == {"magnification": 0.001}
     with pytest.raises(InputError, match="sealed already"):
         making.make(out, seed=5)
+
+
+@pytest.mark.slow
+def test_a_small_check_from_end_to_end(tmp_path):
+    """The real diagnosis of real sealed tests: a result for each, under unbroken seals."""
+    out = tmp_path / "check"
+    making.make(out, size="small", seed=11)
+    run(out, workers=2)
+    open_check(out)
+    result = json.loads((out / "result.json").read_text())
+    assert result["seals_ok"] is True
+    assert result["cases"] == 12
+    assert result["failed"] == 0

@@ -74,8 +74,8 @@ class Size:
 
 
 SIZES = {
-    "small": Size(1.5, 3.0, ("seb", "seb"), 25, 0.09),
-    "full": Size(0.6, 1.2, ("seb", "seb", "seb", "seb", "dct", "dct"), 61, 0.0439),
+    "small": Size(1.5, 2.0, ("seb", "seb"), 25, 0.09),
+    "full": Size(0.6, 1.0, ("seb", "seb", "seb", "seb", "dct", "dct"), 61, 0.0439),
 }
 # small: what each of the twelve cases is, in the order of the library's kinds
 SMALL = (

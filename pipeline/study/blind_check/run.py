@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,13 @@ DIAGNOSES, SIMULATIONS, SCRATCH = "diagnoses", "simulations", "scratch"
 
 
 def run(
-    out: Path, *, diagnose: str = DIAGNOSE, seed: int = 0, prefix: Sequence[str] = (), progress: Progress | None = None
+    out: Path,
+    *,
+    diagnose: str = DIAGNOSE,
+    seed: int = 0,
+    workers: int = 1,
+    prefix: Sequence[str] = (),
+    progress: Progress | None = None,
 ) -> str:
     """Diagnose the bundles of OUT, each in a process of its own; goes on where it stopped; then seals.
 
@@ -43,6 +50,7 @@ def run(
     out : folder of `make`, or with bundles/, plan.json (optional) and seal.json of another program
     diagnose : "module:function" with the signature of `study.diagnose.diagnose`
     seed : of the diagnoses
+    workers : diagnoses at a time
     prefix : words before the command of every process, such as a tracer's
 
     Raises
@@ -63,9 +71,13 @@ def run(
     done = [name for name in names if _found(out, name) is not None]
     progress.stage(f"diagnosing {len(names)} sealed bundles")
     progress.begin(len(names), len(done), "diagnosis")
-    for name in names:
-        if name not in done:
-            failure = _diagnosed(out, name, plan.get(name, {}).get("without", ()), diagnose, seed, prefix)
+
+    def judge(name: str) -> str | None:
+        return _diagnosed(out, name, plan.get(name, {}).get("without", ()), diagnose, seed, prefix)
+
+    wanted = [name for name in names if name not in done]
+    with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
+        for name, failure in zip(wanted, pool.map(judge, wanted), strict=True):
             if failure is None:
                 progress.done(name)
             else:
