@@ -21,7 +21,17 @@ from pipeline.cli import app
 from pipeline.equilibrium.path import Increments
 from pipeline.explicit import loading
 from pipeline.store.fields import read_fields
-from pipeline.study import cross_check, diagnose_result, dic, identify, model, observation, simulate, virtual_test
+from pipeline.study import (
+    cross_check,
+    diagnose_result,
+    dic,
+    identify,
+    model,
+    observation,
+    simulate,
+    virtual_test,
+    widening,
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
@@ -145,6 +155,9 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
     "function",
     [
         identify.identification_result,
+        identify.estimate_result,
+        identify.optimum_result,
+        widening.widened_result,
         simulate.simulate,
         simulate.test_result,
         model.model,

@@ -96,25 +96,33 @@ def conclude(
 def identification_result(
     campaign: Campaign, found: Estimate, problem: Problem, optimum: Solution, seconds: float
 ) -> dict[str, Any]:
-    """The estimate by the keys of result.json; f_max per bond of the bundle's lattice."""
-    cmod, load = optimum.curve.peak()
-    record = campaign.model.bundle.need_curve()
-    measured_cmod, measured_load = record.peak()
-    measured_energy = cmod_energy(record.until(float(optimum.curve.cmod[-1])), problem.specimen)
-    doubt = found.uncertainty
-    area = 2 * campaign.model.bundle.model.radius * problem.specimen.thickness
+    """The numbers of an identification by the keys of result.json; f_max per bond of the bundle's lattice."""
+    bundle = campaign.model.bundle
+    area = 2 * bundle.model.radius * problem.specimen.thickness
     return {
         "version": __version__,
         "command": "identify",
-        "bundle": campaign.model.bundle.name,
+        "bundle": bundle.name,
         "geometry": problem.specimen.geometry,
         "thickness_mm": problem.specimen.thickness / MM,
-        "temperature_c": campaign.model.bundle.loading.temperature_c,
-        "cmod_rate_mm_per_min": campaign.model.bundle.loading.cmod_rate_mm_per_min,
+        "temperature_c": bundle.loading.temperature_c,
+        "cmod_rate_mm_per_min": bundle.loading.cmod_rate_mm_per_min,
         "bond_area_mm2": area / MM**2,
         "seconds": seconds,
         "engine": campaign.settings.engine,
         "radius_mm": problem.particles.radius / MM,
+        "viscoelastic": campaign.settings.viscoelastic,
+        **estimate_result(found, area),
+        "remarks": list(campaign.model.remarks),
+        "simulations": len(campaign.used),
+        **optimum_result(campaign, problem, optimum),
+    }
+
+
+def estimate_result(found: Estimate, area: float) -> dict[str, Any]:
+    """The estimate, its intervals and how it was made; area (m²) is that of one bond."""
+    doubt = found.uncertainty
+    return {
         "f_max_n": found.f_max,
         "delta_max_m": found.delta_max,
         "bond_fracture_energy_j_per_m2": 2 * found.bond_energy / area,
@@ -126,7 +134,6 @@ def identification_result(
         and {"f_max_n": doubt.noise_only["f_max"], "delta_max_m": doubt.noise_only["delta_max"]},
         "correlation": doubt and doubt.correlation,
         "covariance": doubt and doubt.covariance,
-        "viscoelastic": campaign.settings.viscoelastic,
         "objective": found.settings.objective,
         "surrogate": found.settings.surrogate,
         "paper": paper_result(found),
@@ -141,14 +148,22 @@ def identification_result(
         "status": found.status,
         "converged": found.minimum.converged and found.accepted,
         "warnings": list(found.warnings),
-        "remarks": list(campaign.model.remarks),
         "grid": {
             "f_max_n": found.design.f_max,
             "delta_max_m": found.design.delta_max,
             "objective": found.objective,
         },
         "surrogate_loo_error": found.loo_error,
-        "simulations": len(campaign.used),
+    }
+
+
+def optimum_result(campaign: Campaign, problem: Problem, optimum: Solution) -> dict[str, Any]:
+    """The simulated test at the estimate beside the measured one."""
+    cmod, load = optimum.curve.peak()
+    record = campaign.model.bundle.need_curve()
+    measured_cmod, measured_load = record.peak()
+    measured_energy = cmod_energy(record.until(float(optimum.curve.cmod[-1])), problem.specimen)
+    return {
         "quasi_static_error": optimum.quasi_static_error,
         "load_cmod": curve_result(optimum),
         "peak_load_n": load,
