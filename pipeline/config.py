@@ -185,6 +185,8 @@ def load_settings(path: Path, options: Mapping[str, Any] | None = None) -> RunSe
     return run_settings(raw | given, path.name)
 
 
+SLURM_RULE = "must be a name of SLURM: letters, digits and . _ + , -, the first a letter or digit, at most 64"
+_PATTERNS = {"dask": "must be an address as `dask scheduler` prints it, as in tcp://host:8786"}
 _LENGTHS = {"too_short": "needs at least {min_length} entries", "too_long": "has more than {max_length} entries"}
 
 
@@ -194,6 +196,8 @@ def _sentence(problem: ErrorDetails) -> str:
     if kind == "extra_forbidden":
         meant = difflib.get_close_matches(key, list(RunSettings.model_fields), n=1)
         return f"{key} is not a setting: " + (f"did you mean {meant[0]}?" if meant else "remove it")
+    if kind == "string_pattern_mismatch":
+        return f"{key} = {problem['input']!r}: {_PATTERNS.get(key, SLURM_RULE)}"
     if kind in _LENGTHS:
         return f"{key} = {problem['input']!r}: {_LENGTHS[kind].format(**problem['ctx'])}"
     rule = str(problem["ctx"]["error"]) if kind == "value_error" else problem["msg"].replace("Input should", "should")

@@ -52,6 +52,8 @@ def test_options_that_are_none_are_defaults_and_others_win_over_the_file(tmp_pat
         ({"grid": [-1.0, 1.0, 1.1]}, "should be greater than 0"),
         ({"radius_mm": -0.3}, "radius_mm = -0.3: "),
         ({"viscoelastic": 1}, "viscoelastic = 1: "),
+        ({"slurm_partition": "a;b"}, "slurm_partition = 'a;b': must be a name of SLURM: letters, digits"),
+        ({"dask": "head:8786"}, "dask = 'head:8786': must be an address as `dask scheduler` prints it"),
     ],
 )
 def test_a_refusal_names_key_value_and_rule(options, sentence):

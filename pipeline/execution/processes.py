@@ -44,6 +44,22 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def workers_of(ranks: int, workers: int | None) -> int | None:
+    """Simulations at a time where each has MPI ranks: as asked for, or as many as the processors carry.
+
+    Raises
+    ------
+    InputError
+        where ranks would share a processor: they wait for each other without letting go of it
+    """
+    if ranks == 1:
+        return workers
+    if ranks * (workers or 1) > cores():
+        asked = f"ranks = {ranks}" + (f" times workers = {workers}" if workers else "")
+        raise InputError(f"{asked} must not exceed the {cores()} processors of this machine: ranks wait for each other")
+    return workers or cores() // ranks
+
+
 class LocalProcesses(Executor):
     """An executor that runs each call in a spawned process, at most `workers` at a time.
 

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.config import RunSettings
 from pipeline.core.errors import InputError, StoreError
 from pipeline.core.problem import Problem, Solution
+from pipeline.execution.processes import workers_of
 from pipeline.execution.progress import Progress
 from pipeline.execution.simulations import run_all
 from pipeline.inverse.design import Design
@@ -87,12 +88,13 @@ class Campaign:
         keys = [problem_key(problem, self.engine.label) for _, problem in problems]
         wanted = {key: problem for key, (_, problem) in zip(keys, problems, strict=True)}
         names = {key: name for key, (name, _) in zip(keys, problems, strict=True)}
+        here = self.executor is None
         run_all(
             self.engine.solve,
             wanted,
             self.store,
             executor=self.executor,
-            workers=self.settings.workers,
+            workers=workers_of(self.settings.ranks, self.settings.workers) if here else None,
             progress=self.progress,
             names=names,
         )

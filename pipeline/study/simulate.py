@@ -16,6 +16,7 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen, ligament_area
 from pipeline.core.units import MM
 from pipeline.core.work_of_fracture import END_LOAD, cmod_fracture_energy
+from pipeline.execution.processes import workers_of
 from pipeline.execution.progress import Progress, Silent
 from pipeline.execution.simulations import run_all
 from pipeline.store.bundle import read_bundle
@@ -60,6 +61,7 @@ def simulate(
     wanted = physics_effects(effect)
     settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy, ranks=ranks)
     chosen = engine_of(settings.engine, settings.ranks)
+    workers_of(settings.ranks, 1)  # refuses before any work is done
     read = read_bundle(bundle)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)

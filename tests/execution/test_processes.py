@@ -12,7 +12,7 @@ import pytest
 from execution.fake_engine import Task, meet, simulate, threads_of_linear_algebra
 
 from pipeline.core.errors import InputError
-from pipeline.execution.processes import LocalProcesses, WorkerLostError, cores
+from pipeline.execution.processes import LocalProcesses, WorkerLostError, cores, workers_of
 
 
 def gone(pid: int) -> bool:
@@ -21,6 +21,17 @@ def gone(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
     except OSError:
         return True
+
+
+def test_ranks_never_share_a_processor():
+    assert (workers_of(1, None), workers_of(1, 100)) == (None, 100), "one rank lets go of the processor"
+    assert workers_of(cores(), None) == 1
+    if cores() > 1:
+        assert workers_of(2, None) == cores() // 2
+        with pytest.raises(InputError, match=rf"times workers = {cores()} must not exceed the {cores()} processors"):
+            workers_of(2, cores())
+    with pytest.raises(InputError, match=rf"ranks = {cores() + 1} must not exceed"):
+        workers_of(cores() + 1, None)
 
 
 def test_a_result_comes_back():
