@@ -11,6 +11,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, InvalidStateErr
 from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
+from pipeline import __version__
 from pipeline.core.errors import InputError, ToolchainError
 from pipeline.execution.processes import WorkerLostError
 from pipeline.execution.serve import do_in_a_process
@@ -69,7 +70,7 @@ class DaskWorkers(Executor):
         key = f"simulation-{uuid.uuid4().hex}"
         call = pickle.dumps(partial(fn, *args, **kwargs))
         with self._lock:
-            task = self._client.submit(do_in_a_process, call, key=key, pure=False, retries=0)
+            task = self._client.submit(do_in_a_process, call, __version__, key=key, pure=False, retries=0)
             self._running[key] = (future, task)
         task.add_done_callback(partial(self._settle, key))
         future.add_done_callback(partial(self._forget, key))

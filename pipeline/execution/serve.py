@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import platform
 import subprocess
 import sys
 import tempfile
@@ -16,21 +17,29 @@ import time
 from pathlib import Path
 from typing import Any
 
+from pipeline import __version__
+from pipeline.core.errors import ToolchainError
 from pipeline.execution.processes import THREADS, WorkerLostError, epitaph
 
 CALL, ANSWER = "call", "answer"
 
 
-def do_in_a_process(call: bytes) -> Any:
+def do_in_a_process(call: bytes, version: str = __version__) -> Any:
     """Do a pickled call in a fresh process, so that it may change its folder, use MPI, or crash.
 
     Raises
     ------
+    ToolchainError
+        where this package is not of the version that asks: its results would not be
     WorkerLostError
         where the process ended without an answer
     Exception
         what the call itself raised
     """
+    if version != __version__:
+        raise ToolchainError(
+            f"the worker on {platform.node()} has version {__version__} of this package: install {version} there"
+        )
     with tempfile.TemporaryDirectory(prefix="cohesive-bpm-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / CALL).write_bytes(call)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ from string import Template
 
 from pipeline.core.errors import InputError, MissingFileError, StoreError
 from pipeline.core.problem import Problem, Solution
-from pipeline.hpc.checksums import checksum_list, checksums, sha256
+from pipeline.hpc.checksums import changed, checksum_list, checksums, read_checksum_list, sha256
 from pipeline.hpc.manifest import FILE, Manifest, Point, manifest_text, read_manifest
 from pipeline.lmp import simulate
 from pipeline.lmp.deck import DECK, write_deck
@@ -85,6 +86,28 @@ def default_stretch(problem: Problem, ranks: int) -> int:
     return max(1000, int(SECONDS * ranks / (PER_BOND * problem.bonds.count)))
 
 
+def stretch_of(out: Path, wanted: int | None, problem: Problem, ranks: int) -> int:
+    """Steps between restart files: as wanted, as of the decks that lie in OUT already, or `default_stretch`.
+
+    Raises
+    ------
+    InputError
+        where those decks have another stretch than the one that is wanted
+    """
+    asked = wanted or default_stretch(problem, ranks)
+    deck = next((out / "points").glob("*/settings.inc"), None)
+    if deck is None:
+        return asked
+    held = dict(re.findall(r"^variable (\w+) index (\d+)$", deck.read_text("ascii"), re.MULTILINE))
+    stretch, record = int(held["stretch"]), int(held["record"])
+    if asked <= stretch < asked + record:  # decks round up to a multiple of their records
+        return asked
+    if wanted:
+        told = f"the decks in {out} write restart files every {stretch} steps, not every {wanted}"
+        raise InputError(f"{told}: leave --restart-steps out, or export into another folder")
+    return stretch
+
+
 def begin_study(out: Path) -> None:
     """Make OUT for a study and mark it as begun; refuse a folder that holds anything else.
 
@@ -133,26 +156,47 @@ def _write_point(
     out: Path, study: str, point: Point, problem: Problem, variant: Variant, stretch: int, first: dict[str, Path]
 ) -> Point:
     folder = out / point.folder
-    if (folder / INPUTS).is_file():
+    title = f"study {study} point {point.number} key {point.key}"
+    if _is_whole(folder, title):
+        for name, digest in read_checksum_list((folder / INPUTS).read_text("ascii")).items():
+            first.setdefault(digest, folder / name)
         return replace(point, inputs=sha256(folder / INPUTS))
-    shutil.rmtree(folder, ignore_errors=True)
     draft = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     variant.write(draft, problem, stretch)
     digests = checksums(draft, [path.name for path in draft.iterdir()])
     for name, digest in digests.items():
-        _share(draft / name, first.setdefault(digest, folder / name))
-    title = f"study {study} point {point.number} key {point.key}"
+        if digest in first:
+            _share(draft / name, first[digest])
     (draft / INPUTS).write_text(checksum_list(digests, title), encoding="ascii")
-    draft.rename(folder)
+    _put(draft, folder)
+    for name, digest in digests.items():
+        first.setdefault(digest, folder / name)
     return replace(point, inputs=sha256(folder / INPUTS))
+
+
+def _is_whole(folder: Path, title: str) -> bool:
+    """Whether a point has the inputs that were written for it, unchanged."""
+    if not (folder / INPUTS).is_file():
+        return False
+    text = (folder / INPUTS).read_text(errors="replace")
+    return text.startswith(f"# {title}\n") and not changed(folder, read_checksum_list(text))
+
+
+def _put(draft: Path, folder: Path) -> None:
+    """Let a draft be the folder of a point; what was run from the very same inputs stays."""
+    if (folder / INPUTS).is_file() and sha256(folder / INPUTS) == sha256(draft / INPUTS):
+        for path in draft.iterdir():
+            path.replace(folder / path.name)
+        draft.rmdir()
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    draft.rename(folder)
 
 
 def _share(path: Path, first: Path) -> None:
     """Let a file that equals one of an earlier point be the same on disk."""
-    if not first.is_file():
-        return
     path.unlink()
     try:
         os.link(first, path)
@@ -212,6 +256,8 @@ def _job_words(manifest: Manifest, job: Job) -> dict[str, object]:
         "study": manifest.study[:8],
         "array": f"0-{last}" + (f"%{job.array_limit}" if job.array_limit else ""),
         "ranks": job.ranks,
+        # a launcher that `environment` names wins
+        "launcher": "export LAUNCHER=srun\n" if job.ranks > 1 else "",
         "walltime": job.walltime_min,
         # time for LAMMPS to be ended and the task to be queued again; SLURM may be a minute early
         "lead": max(5, min(120, 6 * job.walltime_min)),

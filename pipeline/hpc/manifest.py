@@ -11,6 +11,7 @@ from typing import Any
 from pipeline.core.errors import MissingFileError, StoreError
 
 FILE, FORMAT = "manifest.json", 1
+REMEDY = "copy it from where it was exported, or export into another folder"
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,8 @@ def read_manifest(study: Path) -> Manifest:
         raise MissingFileError(
             f"{study} is no exported study: {FILE} is missing; `export BUNDLE OUT` makes one"
         ) from None
-    except ValueError as error:
-        raise StoreError(f"{path} is damaged ({error}): copy it from where it was exported, or export again") from None
+    except (ValueError, RecursionError) as error:
+        raise StoreError(f"{path} is damaged ({error}): {REMEDY}") from None
     return _manifest(values, path)
 
 
@@ -107,12 +108,10 @@ def _manifest(values: Any, path: Path) -> Manifest:
     if not isinstance(values, dict) or values.get("program") != "cohesive-bpm":
         raise StoreError(f"{path} is the manifest of another program: give the folder that `export` has made")
     if values.get("format") != FORMAT:
-        raise StoreError(f"{path} has format {values.get('format')}, this version reads {FORMAT}: export again")
+        raise StoreError(f"{path} has format {values.get('format')}, this version reads {FORMAT}: {REMEDY}")
     told = values.pop("checksum", None)
     if told != _checksum(values):
-        raise StoreError(
-            f"{path} was changed after it was written: copy it from where it was exported, or export again"
-        )
+        raise StoreError(f"{path} was changed after it was written: {REMEDY}")
     known = {entry.name for entry in fields(Manifest)}
     points = tuple(Point(**point) for point in values["points"])
     return Manifest(**{name: values[name] for name in known - {"points"}}, points=points)

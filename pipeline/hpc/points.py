@@ -59,12 +59,9 @@ def look_at(study: Path, point: Point) -> Found:
     if wrong := changed(folder, read_checksum_list((folder / INPUTS).read_text(errors="replace"))):
         return Found(point, State.DAMAGED, f"{wrong[0]}; export again, and {again}")
     if not (folder / RESULTS).is_file():
-        began = (folder / "curve.txt").is_file()
-        return Found(
-            point,
-            State.UNFINISHED if began else State.MISSING,
-            f"it was {'stopped' if began else 'never run'}; {again}",
-        )
+        if (folder / "curve.txt").is_file():
+            return Found(point, State.UNFINISHED, f"it was stopped, or is under way; unless it is, {again}")
+        return Found(point, State.MISSING, f"it was never run; {again}")
     return _results_of(folder, point, again)
 
 

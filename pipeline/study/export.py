@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import UnavailableError
+from pipeline.core.errors import PipelineError, UnavailableError
 from pipeline.execution.progress import Progress, Silent
 from pipeline.hpc.folder import (
     VARIANTS,
     Job,
     begin_study,
-    default_stretch,
     finish_study,
     refuse_another,
+    stretch_of,
     write_points,
     write_scripts,
 )
@@ -65,23 +66,36 @@ def export(
         raise UnavailableError("a study for a cluster is run by LAMMPS, without levelling: leave these settings out")
     out, told = Path(out), progress or Silent()
     read = read_bundle(bundle)
-    begin_study(out)
+    with written_in(out):
+        begin_study(out)
     variant = VARIANTS[stock or "cohesive"]
     campaign, nodes, points = planned(read, out, settings, variant.name, told)
     study = study_of([point.key for point in points])
     refuse_another(out, study)
+    problems = [campaign.problem(*node) for node in nodes]
+    stretch = stretch_of(out, settings.restart_steps, problems[0], settings.ranks)
     copy_bundle(read, campaign, out / BUNDLE)
     told.stage(f"{len(points)} decks")
-    problems = [campaign.problem(*node) for node in nodes]
-    stretch = settings.restart_steps or default_stretch(problems[0], settings.ranks)
     plain = settings.model_dump(mode="json", exclude_none=True)
     manifest = Manifest(
         study, __version__, read.name, variant.name, campaign.engine.label, plain, variant.versions, tuple(points)
     )
-    manifest = manifest.with_points(write_points(out, study, points, problems, variant, stretch))
-    write_scripts(out, manifest, variant, job_of(settings), stretch)
-    finish_study(out, manifest)
+    with written_in(out):
+        manifest = manifest.with_points(write_points(out, study, points, problems, variant, stretch))
+        write_scripts(out, manifest, variant, job_of(settings), stretch)
+        finish_study(out, manifest)
     return f"{len(points)} points of {problems[0].particles.count} particles; {out}/README.md says how to run them"
+
+
+@contextmanager
+def written_in(out: Path) -> Iterator[None]:
+    """Turn an error of the file system into one that names the file, or at least OUT, and what to do."""
+    try:
+        yield
+    except PipelineError:
+        raise
+    except OSError as error:
+        raise refused(Path(error.filename or out), error) from error
 
 
 def planned(
@@ -96,12 +110,12 @@ def planned(
     return campaign, nodes, points_of(campaign, nodes)
 
 
-def points_of(campaign: Campaign, nodes: Sequence[tuple[float, float]], first: int = 0) -> list[Point]:
-    """Points for nodes of a grid, numbered from `first`."""
+def points_of(campaign: Campaign, nodes: Sequence[tuple[float, float]]) -> list[Point]:
+    """Points for nodes of a grid, numbered from 0."""
     keys = [problem_key(campaign.problem(*node), campaign.engine.label) for node in nodes]
     return [
         Point(k, float(f_max), float(delta_max), key)
-        for k, ((f_max, delta_max), key) in enumerate(zip(nodes, keys, strict=True), first)
+        for k, ((f_max, delta_max), key) in enumerate(zip(nodes, keys, strict=True))
     ]
 
 
@@ -119,20 +133,24 @@ def job_of(settings: RunSettings) -> Job:
 def copy_bundle(read: Bundle, campaign: Campaign, folder: Path) -> None:
     """Copy what an identification reads of a test; measured fields stand in for speckle images.
 
+    The test may be the copy itself, of a study that is exported again: the old copy goes when the new one is whole.
+
     Raises
     ------
     StoreError
         naming what cannot be written
     """
     sources = campaign.model.bundle.sources
-    images = {path.resolve() for path in read.images}
+    images, draft = bool(read.images), folder.with_name(f".{folder.name}.part")
     try:
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
+        shutil.rmtree(draft, ignore_errors=True)
+        draft.mkdir(parents=True)
         for path in sorted(read.folder.iterdir()):
             if path.is_file() and path.name not in ("truth.json", "truth.h5", "frames.csv" if images else ""):
-                shutil.copyfile(path, folder / path.name)
+                shutil.copyfile(path, draft / path.name)
         if sources.fields is not None and sources.fields.resolve().parent != read.folder.resolve():
-            shutil.copyfile(sources.fields, folder / "fields.h5")
+            shutil.copyfile(sources.fields, draft / "fields.h5")
+        shutil.rmtree(folder, ignore_errors=True)
+        draft.rename(folder)
     except OSError as error:
         raise refused(folder, error) from error

@@ -61,7 +61,7 @@ def simulate(
     wanted = physics_effects(effect)
     settings = settings_of(config, engine=engine, radius_mm=radius_mm, accuracy=accuracy, ranks=ranks)
     chosen = engine_of(settings.engine, settings.ranks)
-    workers_of(settings.ranks, 1)  # refuses before any work is done
+    workers_of(settings.ranks, None)  # refuses before any work is done
     read = read_bundle(bundle)
     folder = results_folder(out, read)
     model = build_model(read, settings.radius)

@@ -16,12 +16,18 @@ from execution.fake_engine import FolderStore, Task, meet, simulate
 from execution.test_processes import gone
 from execution.test_simulations import Diary, assert_answers, tasks
 
-from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.core.errors import ConvergenceError, InputError, ToolchainError
 from pipeline.execution.dask_workers import DaskWorkers, executor_of
 from pipeline.execution.processes import WorkerLostError
+from pipeline.execution.serve import do_in_a_process
 from pipeline.execution.simulations import SimulationError, run_all
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed: scripts/test installs it")
+
+
+def test_a_worker_of_another_version_does_not_simulate() -> None:
+    with pytest.raises(ToolchainError, match=r"has version .* of this package: install 0\.0\.1 there"):
+        do_in_a_process(b"", "0.0.1")
 
 
 class Cluster:

@@ -48,6 +48,7 @@ def test_a_folder_without_a_manifest_is_no_study(tmp_path: Path) -> None:
         (lambda text: "[]", "manifest of another program"),
         (lambda text: text.replace('"format": 1', '"format": 2'), "has format 2, this version reads 1"),
         (lambda text: "\x00" + text, "is damaged"),
+        (lambda text: "[" * 200_000, "is damaged"),
     ],
 )
 def test_a_manifest_that_was_changed_is_refused(tmp_path: Path, edit, told: str) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -104,7 +106,7 @@ def test_what_is_missing_is_named_and_the_rest_is_kept(study: Path, path: str) -
     assert str(caught.value).splitlines() == [
         "6 of 9 points are whole and kept; the fit needs them all",
         "points/0001 is missing: its folder is not there; copy it back",
-        "points/0004 is not finished: it was stopped; run point 4 again",
+        "points/0004 is not finished: it was stopped, or is under way; unless it is, run point 4 again",
         "points/0005 is missing: it was never run; run point 5 again",
     ]
     assert len(list((study / "simulations").glob("*.h5"))) == 6
@@ -175,6 +177,84 @@ def test_an_export_again_changes_nothing(exported: Path, bundle: Path) -> None:
     before = {str(file): file.read_bytes() for file in exported.rglob("*") if file.is_file()}
     export(bundle, exported, grid=GRID, restart_steps=1000)
     assert {str(file): file.read_bytes() for file in exported.rglob("*") if file.is_file()} == before
+
+
+def test_an_export_again_from_its_own_copy_of_the_test_keeps_it(exported: Path, tmp_path: Path) -> None:
+    shutil.copytree(exported, tmp_path / "study")
+    export(tmp_path / "study/bundle", tmp_path / "study", grid=GRID, restart_steps=1000, walltime_min=7)
+    for file in (exported / "bundle").iterdir():
+        assert (tmp_path / "study/bundle" / file.name).read_bytes() == file.read_bytes()
+    assert "#SBATCH --time=7\n" in (tmp_path / "study/submit.slurm").read_text()
+
+
+def test_an_export_again_keeps_the_steps_between_restart_files(exported: Path, bundle: Path, tmp_path: Path) -> None:
+    shutil.copytree(exported, tmp_path / "study")
+    with pytest.raises(InputError, match="every 1000 steps, not every 5000: leave --restart-steps out"):
+        export(bundle, tmp_path / "study", grid=GRID, restart_steps=5000)
+    export(bundle, tmp_path / "study", grid=GRID)
+    assert "every 1000 steps" in (tmp_path / "study/README.md").read_text()
+
+
+def test_an_export_again_mends_damaged_inputs_and_takes_none_of_another_study(
+    study: Path, exported: Path, bundle: Path, tmp_path: Path
+) -> None:
+    export(bundle, tmp_path / "other", grid=(0.8, 1.0, 1.2), restart_steps=1000)
+    (study / "points/0002/bonds.inc").write_text("bond_coeff 1 1 1 1\n")
+    shutil.rmtree(study / "points/0003")
+    shutil.copytree(tmp_path / "other/points/0003", study / "points/0003")
+    export(bundle, study, grid=GRID, restart_steps=1000)
+    for point in ("points/0002", "points/0003"):
+        for file in (exported / point).iterdir():
+            assert (study / point / file.name).read_bytes() == file.read_bytes()
+    with pytest.raises(StoreError) as caught:
+        collect(study)
+    told = str(caught.value).splitlines()
+    assert told[0].startswith("8 of 9 points are whole"), "what was run from the same inputs still counts"
+    assert told[1:] == ["points/0003 is missing: it was never run; run point 3 again"]
+
+
+def test_a_launcher_of_the_environment_starts_lammps(exported: Path, path: str, tmp_path: Path) -> None:
+    shutil.copytree(exported, tmp_path / "study")
+    (tmp_path / "launch").write_text('#!/bin/sh\nshift\nprintf launched >launched\nexec "$@"\n')
+    (tmp_path / "launch").chmod(0o755)
+    line = [shutil.which("sh") or "sh", str(tmp_path / "study/run-point"), "0"]
+    variables = {"PATH": path, "LAUNCHER": f"{tmp_path}/launch -n"}
+    subprocess.run(line, env=variables, check=True, capture_output=True, timeout=300)
+    assert (tmp_path / "study/points/0000/launched").exists()
+
+
+def test_a_job_of_several_ranks_is_launched_on_them(bundle: Path, tmp_path: Path) -> None:
+    export(bundle, tmp_path / "one", grid=GRID)
+    export(bundle, tmp_path / "many", grid=GRID, ranks=64)
+    assert "LAUNCHER" not in (tmp_path / "one/submit.slurm").read_text()
+    text = (tmp_path / "many/submit.slurm").read_text()
+    assert "#SBATCH --ntasks=64\n" in text
+    assert "export LAUNCHER=srun\nsh run-point" in text
+
+
+def test_the_style_is_built_from_a_folder_named_from_where_one_stands(exported: Path, tmp_path: Path) -> None:
+    (tmp_path / "lammps/src").mkdir(parents=True)
+    (tmp_path / "lammps/src/lammps.h").touch()
+    line = [shutil.which("sh") or "sh", str(exported / "style/build"), "--copy", "lammps"]
+    subprocess.run(line, cwd=tmp_path, check=True, capture_output=True)
+    copied = {file.name for file in (tmp_path / "lammps/src").glob("*.cpp")}
+    ours = {file.name for file in (exported / "style").glob("*.cpp") if not file.name.endswith("plugin.cpp")}
+    assert copied == ours
+
+
+def test_a_place_that_cannot_be_written_is_named(bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match=r"file cannot be written: a file stands where a folder is needed"):
+        export(bundle, tmp_path / "file", grid=GRID)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr("pipeline.study.export.write_points", full)
+        with pytest.raises(StoreError, match=r"study cannot be written: the disk is full"):
+            export(bundle, tmp_path / "study", grid=GRID)
+    assert "9 points" in export(bundle, tmp_path / "study", grid=GRID), "the same command goes through it again"
 
 
 EVIL = "a$(touch pwned)`touch pwned`;touch pwned\\n#SBATCH --wrap=x\\nshell touch pwned"
