@@ -123,7 +123,10 @@ def test_history_is_written_and_read_as_a_table(newton: str, tmp_path: Path) -> 
             "line 2 holds 4 values, expected 5: id1 id2 and 3 of history",
         ),
         ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 2 0.1 0.2 x\n", "line 2: x is not a number"),
+        ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 2 nan 6e-4 0\n", "line 2: nan is not a number"),
         ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 3 0 6e-4 0\n", "no cohesive bond between atoms 1 and 3"),
+        ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 2000000000 0 6e-4 0\n", "no cohesive bond between atoms 1 and 2000000000"),
+        ("ITEM: ENTRIES id1 id2 h1 h2 h3\n-1 2 0 6e-4 0\n", "no cohesive bond between atoms -1 and 2"),
         (None, "cannot read"),
     ],
 )
@@ -153,6 +156,50 @@ def test_a_restart_brings_back_coefficients_and_history(law: str, tmp_path: Path
     finally:
         again.close()
     assert f"1 {float(KN):.17g} {FN:.17g}" in (tmp_path / "bond.data").read_text()
+
+
+@pytest.mark.parametrize("law", [CENTRAL, coefficients(MIXED, 0)])
+def test_memory_goes_with_its_bond_where_another_is_deleted(law: str) -> None:
+    """Without newton, the middle particles have two bonds each; the second takes the place of the first."""
+    with chain(law, count=4, before="newton off") as lmp:
+        for stretch in (90, 20):
+            lmp.numpy.extract_atom("x")[2:4, 0] = (np.array([2, 3]) + stretch * PEAK / LENGTH) * LENGTH
+            lmp.command("run 0 post no")
+        expected = forces(lmp, 4)
+        lmp.commands_string("group first id 1 2\ndelete_bonds first bond 1 remove special\nrun 0 post no")
+        assert 0.1 * FN < expected[1, 0] < 0.9 * 20 * PEAK * KN, "the bond between 2 and 3 softened"
+        assert forces(lmp, 4) == pytest.approx(expected, abs=ROUND_OFF * FN)  # of what is left the first had no force
+
+
+@pytest.mark.parametrize("newton", ["newton on", "newton off"])
+@pytest.mark.parametrize("style", [SMALL, FINITE])
+@pytest.mark.parametrize("law", [CENTRAL, coefficients(MIXED, 0)], ids=["central", "sliding"])
+def test_the_virial_is_the_derivative_of_the_energy(law: str, style: str, newton: str) -> None:
+    """A softened and bent chain is strained as a whole: -W = dE/d(strain) for stretches along x and y."""
+    with chain(law, style, count=4, angle=0.4, before=newton) as lmp:
+        place = lmp.numpy.extract_atom("x")
+        start = place[:4, :2].copy()
+        bent = np.array([[0, 0], [1, 0.5], [0, 3], [-0.5, 1]]) * PEAK
+        lmp.command("compute virial all pressure NULL bond")
+        lmp.commands_string("thermo_style custom step pe vol c_virial[1]\nthermo_modify norm no")
+        if law != CENTRAL:
+            lmp.numpy.extract_atom("d_cohesive_theta")[:4] = np.array([1, -2, 3, 0]) * PEAK / LENGTH
+        for size in (20.0, 8.0):
+            place[:4, :2] = start + size * bent
+            lmp.command("run 0 post no")
+        now, area = place[:4, :2].copy(), lmp.get_thermo("vol")
+        virial = lmp.numpy.extract_compute("virial", 0, 1)[:2] * area
+        slope = np.zeros(2)
+        for axis in (0, 1):
+            for strain in (1e-6, -1e-6):
+                place[:4, :2] = now
+                place[:4, axis] *= 1 + strain
+                lmp.command("run 0 post no")
+                slope[axis] += lmp.get_thermo("pe") / (2 * strain)
+        damage = rows(lmp)[:, 4]
+        assert damage.max() > 0.1
+        # energies are quadratic in the strain, but for arcs; what limits is the round-off of a difference of energies
+        assert slope == pytest.approx(-virial, abs=1e-6 * np.abs(virial).max())
 
 
 def test_beside_another_style() -> None:

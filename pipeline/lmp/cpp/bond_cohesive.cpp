@@ -23,7 +23,6 @@
 
 using namespace LAMMPS_NS;
 
-static constexpr const char *HISTORY_NAME = "cohesive_history";
 static constexpr const char *ROTATION_ID = "COHESIVE_ROTATION";
 static constexpr const char *ROTATION[] = {"theta", "omega", "torque", "inertia"};
 // of compute bond/local: opening, delta_reached, damage, tension, sliding, shear, energy used up; then the history
@@ -118,21 +117,6 @@ void BondCohesive::init_style()
   built_calls = -1;
 }
 
-void BondCohesive::make_history()
-{
-  nhistory = sliding ? 6 : 3;
-  for (const auto &own : law)
-    if (own.creeps()) nhistory = std::max(nhistory, 6 + own.arms);
-  if (!modify->get_fix_by_id(history_id))
-    modify->add_fix(fmt::format("{} all property/atom d2_{} {} writedata no", history_id, HISTORY_NAME,
-                                nhistory * atom->bond_per_atom));
-  int is_double, columns;
-  history_index = atom->find_custom(HISTORY_NAME, is_double, columns);
-  if (history_index < 0 || columns != nhistory * atom->bond_per_atom)
-    error->all(FLERR, "the stored history of bond_style cohesive does not fit {} values for {} bonds per atom: give "
-               "every bond_coeff, with its options, before the first run", nhistory, atom->bond_per_atom);
-}
-
 // rotations live in a fix property/atom, so that they move with their particles and stand in restart files
 void BondCohesive::make_rotation()
 {
@@ -151,21 +135,9 @@ double *BondCohesive::rotation(const char *name) const
   return atom->dvector[index];
 }
 
-double *BondCohesive::history(int i, int slot) const
-{
-  return atom->darray[history_index][i] + nhistory * slot;
-}
-
 bool BondCohesive::list_is_old() const
 {
   return built_calls != neighbor->ncalls || built_step != neighbor->lastcall;
-}
-
-int BondCohesive::find_slot(int i, tagint partner) const
-{
-  for (int m = 0; m < atom->num_bond[i]; m++)
-    if (atom->bond_atom[i][m] == partner) return m;
-  return -1;
 }
 
 // every bond stored on this rank once; newton_bond off keeps two copies, of which the lower tag's computes
@@ -174,6 +146,7 @@ void BondCohesive::build_list()
   const int nlocal = atom->nlocal, threads = std::max(1, comm->nthreads);
   part.resize(threads + 1);
   for (auto &own : part) own.clear();
+  follow_partners();
   thread_of.resize(nlocal);
   for (int i = 0; i < nlocal; i++) thread_of[i] = static_cast<std::uint16_t>((bigint) i * threads / nlocal);
   for (int i = 0; i < nlocal; i++) {
@@ -237,48 +210,6 @@ BondCohesive::Worn BondCohesive::worn_of(int i, const Intact &bond) const
   const int mirror_slot = force->newton_bond || j >= atom->nlocal ? -1 : find_slot(j, atom->tag[i]);
   return {bond.nx, bond.ny, bond.length, i, j, bond.type, bond.slot, mirror_slot, own.slope(reached),
           own.plastic(reached), own.limit(reached)};
-}
-
-// a bond's row, from state to store; the undeformed vector stays
-void BondCohesive::keep(const Worn &bond, const double *row)
-{
-  const auto write = [&](double *kept) {
-    kept[0] = row[0];
-    for (int k = 3; k < nhistory; k++) kept[k] = row[k];
-  };
-  write(history(bond.first, bond.slot));
-  if (bond.mirror_slot >= 0) write(history(bond.second, bond.mirror_slot));
-}
-
-std::vector<double> BondCohesive::rows() const
-{
-  std::vector<double> table;
-  for (int i = 0; i < atom->nlocal; i++)
-    for (int m = 0; m < atom->num_bond[i]; m++) {
-      const int type = atom->bond_type[i][m];
-      const tagint own = atom->tag[i], other = atom->bond_atom[i][m];
-      if (type <= 0 || !setflag[type] || (!force->newton_bond && own > other)) continue;
-      table.push_back(static_cast<double>(own));
-      table.push_back(static_cast<double>(other));
-      table.insert(table.end(), history(i, m), history(i, m) + nhistory);
-    }
-  return table;
-}
-
-bool BondCohesive::read_history(tagint first, tagint second, const double *row)
-{
-  bool found = false;
-  for (const bool turned : {false, true}) {
-    const int i = atom->map(turned ? second : first);
-    if (i < 0 || i >= atom->nlocal) continue;
-    const int slot = find_slot(i, turned ? first : second);
-    if (slot < 0) continue;
-    double *kept = history(i, slot);
-    for (int k = 0; k < nhistory; k++) kept[k] = (turned && (k == 1 || k == 2)) ? -row[k] : row[k];
-    found = true;
-  }
-  forget_lists();
-  return found;
 }
 
 void BondCohesive::set_time(double physical)

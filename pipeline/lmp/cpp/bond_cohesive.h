@@ -51,7 +51,7 @@ class BondCohesive : public Bond {
   void add_stiffness(double **opening, double **turning, double share_of_sliding);
   double *rotation(const char *name) const;                // theta, omega, torque or inertia of the particles
   int columns() const { return nhistory; }
-  std::vector<double> rows() const;    // id1 id2 and the history of every bond, once over all ranks
+  std::vector<double> rows();    // id1 id2 and the history of every bond, once over all ranks
   bool read_history(tagint first, tagint second, const double *row);    // false where this rank does not keep it
   void forget_lists() { built_calls = -1; }
 
@@ -96,6 +96,9 @@ class BondCohesive : public Bond {
   Part &part_of(int i, int j);
   int find_slot(int atom, tagint partner) const;
   double *history(int atom, int slot) const;
+  double *partners(int atom) const;
+  int follow_partners(int atom);
+  void follow_partners();
   double elapsed();
 
   template <bool FINITE> void all_forces();

@@ -12,10 +12,13 @@
 #include "update.h"
 #include "utils.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 using namespace LAMMPS_NS;
 
@@ -86,7 +89,7 @@ std::vector<double> CohesiveHistory::rows_of_file(const std::string &file, int c
       for (std::string word; words >> word; found++) {
         char *end = nullptr;
         values.push_back(std::strtod(word.c_str(), &end));
-        if (*end != '\0') wrong = fmt::format("{} line {}: {} is not a number", file, number, word);
+        if (*end != '\0' || !std::isfinite(values.back())) wrong = fmt::format("{} line {}: {} is not a number", file, number, word);
       }
       if (wrong.empty() && found != columns)
         wrong = fmt::format("{} line {} holds {} values, expected {}: id1 id2 and {} of history", file, number, found,
@@ -109,11 +112,16 @@ void CohesiveHistory::read(BondCohesive &bond, const std::string &file)
 {
   const int width = 2 + bond.columns();
   const std::vector<double> rows = rows_of_file(file, width);
-  for (size_t r = 0; r < rows.size(); r += width) {
-    const auto first = static_cast<tagint>(rows[r]), second = static_cast<tagint>(rows[r + 1]);
-    int own = bond.read_history(first, second, &rows[r + 2]), all = 0;
-    MPI_Allreduce(&own, &all, 1, MPI_INT, MPI_MAX, world);
-    if (!all) error->all(FLERR, "{}: there is no cohesive bond between atoms {} and {}", file, first, second);
-  }
+  const auto ends = [&](size_t r) {
+    return std::pair(static_cast<tagint>(rows[r * width]), static_cast<tagint>(rows[r * width + 1]));
+  };
+  std::vector<int> own(rows.size() / width), all(own.size());
+  for (size_t r = 0; r < own.size(); r++)
+    own[r] = bond.read_history(ends(r).first, ends(r).second, &rows[r * width + 2]);
+  MPI_Allreduce(own.data(), all.data(), static_cast<int>(own.size()), MPI_INT, MPI_MAX, world);
+  const size_t unknown = std::find(all.begin(), all.end(), 0) - all.begin();
+  if (unknown < all.size())
+    error->all(FLERR, "{}: there is no cohesive bond between atoms {} and {}", file, ends(unknown).first,
+               ends(unknown).second);
   if (comm->me == 0) utils::logmesg(lmp, "Read the history of {} bonds from {}\n", rows.size() / width, file);
 }

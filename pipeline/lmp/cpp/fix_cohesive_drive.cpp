@@ -29,8 +29,6 @@ static constexpr double HASTE = 10.0;
 // the load is off by up to about twice the lag (measured against the equilibrium engine)
 static constexpr double ERROR_PER_LAG = 2.0;
 static constexpr int NVECTOR = 16;
-// per-particle means kept: velocity x and y, rotation
-static constexpr int NMEAN = 3;
 // what sliding and turning of a bond's ends are bounded by: (a + b)² <= SLIDE a² + TURN b²
 static constexpr double SLIDE = 1.25, TURN = 5.0;
 
@@ -49,6 +47,7 @@ FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
   time_integrate = 1;
   restart_global = 1;
   restart_peratom = 1;
+  create_attribute = 1;
   comm_reverse = 4;
   state.rate = first_rate;
   state.frame_due = 1.0;
@@ -70,100 +69,6 @@ FixCohesiveDrive::~FixCohesiveDrive()
   memory->destroy(mean_v);
   memory->destroy(stiffness);
   memory->destroy(turning);
-}
-
-// grip WEIGHTS DX DY DRIVE drive|react|guide
-void FixCohesiveDrive::parse_grip(char **arg)
-{
-  Grip grip;
-  grip.weights = arg[0];
-  grip.dx = utils::numeric(FLERR, arg[1], false, lmp);
-  grip.dy = utils::numeric(FLERR, arg[2], false, lmp);
-  grip.drive = utils::numeric(FLERR, arg[3], false, lmp);
-  grip.reaction = grip.mobility = 0.0;
-  if (strcmp(arg[4], "drive") == 0)
-    grip.role = DRIVE;
-  else if (strcmp(arg[4], "react") == 0)
-    grip.role = REACT;
-  else if (strcmp(arg[4], "guide") == 0)
-    grip.role = GUIDE;
-  else
-    error->all(FLERR, "role = {} of a grip must be drive, react or guide", arg[4]);
-  if (std::fabs(std::hypot(grip.dx, grip.dy) - 1.0) > 1e-9)
-    error->all(FLERR, "direction = ({}, {}) of a grip must be a unit vector", arg[1], arg[2]);
-  grips.push_back(grip);
-}
-
-void FixCohesiveDrive::parse(int narg, char **arg)
-{
-  int k = 3;
-  const auto need = [&](int n) {
-    if (k + n >= narg) error->all(FLERR, "fix cohesive/drive: '{}' needs {} more value(s)", arg[k], n);
-  };
-  const auto number = [&](double &value) {
-    need(1);
-    value = utils::numeric(FLERR, arg[k + 1], false, lmp);
-    k += 2;
-  };
-  while (k < narg) {
-    if (strcmp(arg[k], "grip") == 0) {
-      need(5);
-      parse_grip(&arg[k + 1]);
-      k += 6;
-    } else if (strcmp(arg[k], "gauge") == 0) {
-      need(1);
-      gauge = arg[k + 1];
-      k += 2;
-    } else if (strcmp(arg[k], "record") == 0) {
-      need(1);
-      nevery = utils::inumeric(FLERR, arg[k + 1], false, lmp);
-      k += 2;
-    } else if (strcmp(arg[k], "frames") == 0) {
-      need(1);
-      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
-      need(n + 1);
-      for (int i = 0; i < n; i++) stations.push_back(utils::numeric(FLERR, arg[k + 2 + i], false, lmp));
-      k += n + 2;
-    } else if (strcmp(arg[k], "clock") == 0) {
-      need(1);
-      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
-      need(2 * n + 1);
-      for (int i = 0; i < n; i++) {
-        clock_cmod.push_back(utils::numeric(FLERR, arg[k + 2 + 2 * i], false, lmp));
-        clock_time.push_back(utils::numeric(FLERR, arg[k + 3 + 2 * i], false, lmp));
-      }
-      k += 2 * n + 2;
-    } else if (strcmp(arg[k], "rate") == 0) {
-      need(3);
-      first_rate = utils::numeric(FLERR, arg[k + 1], false, lmp);
-      lowest_rate = utils::numeric(FLERR, arg[k + 2], false, lmp);
-      highest_rate = utils::numeric(FLERR, arg[k + 3], false, lmp);
-      k += 4;
-    } else if (strcmp(arg[k], "omega") == 0) {
-      number(omega);
-    } else if (strcmp(arg[k], "lag") == 0) {
-      number(lag_wanted);
-    } else if (strcmp(arg[k], "cmod") == 0) {
-      number(cmod_max);
-    } else if (strcmp(arg[k], "load") == 0) {
-      number(first_load);
-    } else {
-      error->all(FLERR, "fix cohesive/drive does not know '{}'", arg[k]);
-    }
-  }
-  if (grips.empty() || gauge.empty()) error->all(FLERR, "fix cohesive/drive needs grips and a gauge");
-  if (!(omega > 0.0)) error->all(FLERR, "omega = {:g} must be positive", omega);
-  if (!(cmod_max > 0.0)) error->all(FLERR, "cmod = {:g} m must be positive", cmod_max);
-  if (!(lag_wanted > 0.0)) error->all(FLERR, "lag = {:g} must be positive", lag_wanted);
-  if (!(first_load > 0.0)) error->all(FLERR, "load = {:g} N must be positive", first_load);
-  if (!(lowest_rate > 0.0 && lowest_rate <= first_rate && first_rate <= highest_rate))
-    error->all(FLERR, "rates {:g} {:g} {:g} must be positive, and the first between lowest and highest", first_rate,
-               lowest_rate, highest_rate);
-  for (const auto *values : {&clock_cmod, &clock_time})
-    if (!values->empty() && (values->size() < 2 || values->front() != 0.0 ||
-                             std::adjacent_find(values->begin(), values->end(), std::greater_equal<>()) != values->end()))
-      error->all(FLERR, "the openings and times of a clock must be two or more values that increase from 0");
-  if (nevery < 1) error->all(FLERR, "record = {} must be positive", nevery);
 }
 
 int FixCohesiveDrive::setmask()
@@ -540,68 +445,4 @@ double FixCohesiveDrive::compute_vector(int k)
     case 15: return state.time;
     default: return state.lag;
   }
-}
-
-double FixCohesiveDrive::memory_usage()
-{
-  return NMEAN * atom->nmax * sizeof(double);
-}
-
-void FixCohesiveDrive::grow_arrays(int nmax)
-{
-  memory->grow(mean_v, nmax, NMEAN, "cohesive/drive:mean_v");
-}
-
-void FixCohesiveDrive::copy_arrays(int i, int j, int)
-{
-  for (int k = 0; k < NMEAN; k++) mean_v[j][k] = mean_v[i][k];
-}
-
-int FixCohesiveDrive::pack_exchange(int i, double *buf)
-{
-  for (int k = 0; k < NMEAN; k++) buf[k] = mean_v[i][k];
-  return NMEAN;
-}
-
-int FixCohesiveDrive::unpack_exchange(int nlocal, double *buf)
-{
-  for (int k = 0; k < NMEAN; k++) mean_v[nlocal][k] = buf[k];
-  return NMEAN;
-}
-
-int FixCohesiveDrive::pack_restart(int i, double *buf)
-{
-  buf[0] = NMEAN + 1;
-  return 1 + pack_exchange(i, buf + 1);
-}
-
-void FixCohesiveDrive::unpack_restart(int nlocal, int nth)
-{
-  double **extra = atom->extra;
-  int m = 0;
-  for (int i = 0; i < nth; i++) m += static_cast<int>(extra[nlocal][m]);
-  for (int k = 0; k < NMEAN; k++) mean_v[nlocal][k] = extra[nlocal][m + 1 + k];
-}
-
-int FixCohesiveDrive::size_restart(int)
-{
-  return NMEAN + 1;
-}
-
-int FixCohesiveDrive::maxsize_restart()
-{
-  return NMEAN + 1;
-}
-
-void FixCohesiveDrive::write_restart(FILE *fp)
-{
-  if (comm->me != 0) return;
-  const int size = sizeof(State);
-  fwrite(&size, sizeof(int), 1, fp);
-  fwrite(&state, sizeof(State), 1, fp);
-}
-
-void FixCohesiveDrive::restart(char *buf)
-{
-  memcpy(&state, buf, sizeof(State));
 }

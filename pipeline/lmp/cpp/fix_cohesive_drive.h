@@ -32,6 +32,7 @@ class FixCohesiveDrive : public Fix {
 
   void grow_arrays(int) override;
   void copy_arrays(int, int, int) override;
+  void set_arrays(int) override;
   int pack_exchange(int, double *) override;
   int unpack_exchange(int, double *) override;
   int pack_restart(int, double *) override;
@@ -44,6 +45,8 @@ class FixCohesiveDrive : public Fix {
   void unpack_reverse_comm(int, int *, double *) override;
 
  private:
+  static constexpr int NMEAN = 3;    // per-particle means kept: velocity x and y, rotation
+
   enum Role { DRIVE, REACT, GUIDE };
 
   // one prescribed mean velocity: sum of weight × direction·v = drive × rate
