@@ -257,6 +257,15 @@ def test_a_place_that_cannot_be_written_is_named(bundle: Path, tmp_path: Path, m
     assert "9 points" in export(bundle, tmp_path / "study", grid=GRID), "the same command goes through it again"
 
 
+def test_another_build_of_the_style_begins_again(exported: Path, path: str, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    shutil.copytree(exported, out)
+    point = out / "points/0000"
+    (point / "restart.1000").write_text("of another build")
+    (point / "style.sha256").write_text(f"{'0' * 64}  {out}/style/cohesiveplugin.so\n")
+    assert run_point(out, 0, path) == (0, "point 0000 from step 0 on\npoint 0000 is done\n")
+
+
 EVIL = "a$(touch pwned)`touch pwned`;touch pwned\\n#SBATCH --wrap=x\\nshell touch pwned"
 
 
