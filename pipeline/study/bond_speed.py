@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import tempfile
 import time
+from pathlib import Path
 from typing import Any
 
 from pipeline.lmp.plugin import open_lammps
@@ -61,6 +65,52 @@ STYLES = {
 }
 
 
+YADE = """
+import time
+radius = 3e-4
+concrete = CpmMat(young=1e10, poisson=0.25, frictionAngle=0.8, density=2000, sigmaT=5e6, epsCrackOnset=1e-4,
+                  relDuctility=600, isoPrestress=0)
+O.materials.append(concrete)
+for row in range(242):
+    for column in range(150):
+        x = radius * (2 * column + row % 2)
+        O.bodies.append(utils.sphere((x, 3**0.5 * radius * row, 0), radius, material=concrete))
+        O.bodies[-1].state.blockedDOFs = "zXY"
+        O.bodies[-1].state.vel = (x / 9, 0, 0)
+O.engines = [
+    ForceResetter(),
+    InsertionSortCollider([Bo1_Sphere_Aabb(aabbEnlargeFactor=1.5, label="boxes")], verletDist=0.2 * radius),
+    InteractionLoop(
+        [Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.5, label="pairs")],
+        [Ip2_CpmMat_CpmMat_CpmPhys(cohesiveThresholdIter=10)],
+        [Law2_ScGeom_CpmPhys_Cpm()],
+    ),
+    NewtonIntegrator(damping=0),
+]
+O.dt = 1e-8
+O.step()
+boxes.aabbEnlargeFactor = pairs.interactionDetectionFactor = -1
+O.run(20, True)
+start = time.process_time()
+O.run(60, True)
+print("seconds a step", (time.process_time() - start) / 60)
+"""
+"""The concrete model of YADE on the same lattice, in the plane with one rotation, on one thread."""
+
+
+def yade_seconds() -> float | None:
+    """Seconds a step of YADE's concrete model (CPM); None where it is not installed."""
+    program = shutil.which("yade")
+    if program is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder) / "cpm.py"
+        script.write_text(YADE, "utf-8")
+        ended = subprocess.run([program, "-n", "-x", "-j1", script], cwd=folder, capture_output=True, text=True)
+    told = [line for line in ended.stdout.splitlines() if line.startswith("seconds a step")]
+    return float(told[0].split()[-1]) if told else None
+
+
 def instance(name: str) -> Any:
     """A lattice of 36,300 particles and 108,117 bonds that moves."""
     bonds, integrator = STYLES[name]
@@ -82,7 +132,8 @@ def bond_speeds(rounds: int) -> dict[str, float]:
             start = time.process_time()
             lmp.command(f"run {steps} pre no post no")
             best[name] = min(best[name], (time.process_time() - start) / steps)
-    return best
+    concrete = yade_seconds()
+    return best if concrete is None else best | {"YADE, CPM": concrete}
 
 
 def bond_speed_table(best: dict[str, float]) -> str:
