@@ -82,10 +82,10 @@ def three(tmp_path) -> Path:
 
 
 def test_what_identify_writes_is_what_the_library_reads():
-    tree = ast.parse(inspect.getsource(identify.identification_result))
-    written = {
-        k.value for d in ast.walk(tree) if isinstance(d, ast.Dict) for k in d.keys if isinstance(k, ast.Constant)
-    }
+    parts = (identify.identification_result, identify.estimate_result, identify.optimum_result)
+    trees = [ast.parse(inspect.getsource(part)) for part in parts]
+    dictionaries = [d for tree in trees for d in ast.walk(tree) if isinstance(d, ast.Dict)]
+    written = {k.value for d in dictionaries for k in d.keys if isinstance(k, ast.Constant)}
     assert set(RESULT) <= written
     assert set(library.NEEDED) <= written
 
