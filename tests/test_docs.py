@@ -54,13 +54,14 @@ def command_lines(page: Path) -> list[str]:
     return [line for line in lines if line.startswith("cohesive-bpm ")]
 
 
-def parse(line: str) -> None:
-    """Read a command line as the program would, without running anything."""
+def parse(line: str) -> str | None:
+    """The command of a line that is read as the program would, without running anything."""
     group = typer.main.get_command(app)
     _, *words = shlex.split(line, comments=True)
     with group.make_context("cohesive-bpm", list(words)) as context:
         name, command, rest = group.resolve_command(context, words)
         command.make_context(name, rest, parent=context).close()
+    return name
 
 
 def anchors(page: Path) -> set[str]:
@@ -119,7 +120,7 @@ def test_a_dead_link_is_seen(link):
 
 @pytest.mark.parametrize("line", sorted({line for page in PAGES for line in command_lines(page)}))
 def test_command_lines_parse(line):
-    parse(line)
+    assert parse(line) == shlex.split(line)[1]
 
 
 @pytest.mark.parametrize(

@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from pipeline.inverse.newton import Smooth
 from pipeline.inverse.surrogate import LagrangeSurrogate
-
-
-class Weights(Protocol):
-    """Weights of the n nodes of a grid at a point, which add up to one, with their derivatives."""
-
-    @property
-    def lower(self) -> np.ndarray: ...
-    @property
-    def upper(self) -> np.ndarray: ...
-    def value(self, parameters: np.ndarray) -> np.ndarray: ...
-    def gradient(self, parameters: np.ndarray) -> np.ndarray: ...
-    def hessian(self, parameters: np.ndarray) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -35,11 +23,11 @@ class SquaredDifference:
 
     Parameters
     ----------
-    weights : Weights of the n nodes
+    weights : Smooth; (n,) weights of the nodes of a grid at a point, which add up to one
     gram : (n, n) array
     """
 
-    weights: Weights
+    weights: Smooth
     gram: np.ndarray
 
     @staticmethod
