@@ -54,7 +54,7 @@ def whole_model(problem: Problem) -> WholeModel:
     """The model of a problem without any reduction."""
     network, constraints = whole_network(problem)
     weight = np.zeros(constraints.drive.size)
-    np.add.at(weight, 2 * problem.gauge.index, problem.gauge.weight)
+    np.add.at(weight, constraints.per * problem.gauge.index, problem.gauge.weight)
     drive = float(weight @ constraints.drive)
     return WholeModel(
         central_law(problem.law, "equilibrium"), network, constraints, constraints.expand.T @ weight, drive

@@ -1,4 +1,9 @@
-"""A bond network in free variables: openings, internal forces and stiffness."""
+"""A bond network in free variables: deformations, internal forces and stiffness.
+
+The deformations of m bonds are their openings (m,); where bonds slide too, all openings and then all slidings (2m,):
+forces and stiffnesses go in the same order. A particle that rotates has a third degree of freedom, its radius times
+its rotation, so that all variables are in m and all their forces in N.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from scipy import sparse
 
-from pipeline.core.problem import Kinematics, Problem
+from pipeline.core.problem import Kinematics, Problem, SlidingLaw
 from pipeline.equilibrium.constraints import Constraints, eliminate
 from pipeline.equilibrium.factor import Solve, rough_solve
 
@@ -17,7 +22,7 @@ class Network(Protocol):
     """Bonds as functions of the free variables q (q,), m, and the machine displacement s, m."""
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
-        """δ (m,), m, of the bonds of this network."""
+        """δ_n (m,), m, of the bonds of this network, and δ_t (m,) behind them where these slide."""
         ...
 
     def pull(self, force: np.ndarray, free: np.ndarray, machine: float) -> tuple[np.ndarray, float]:
@@ -74,35 +79,55 @@ class SmallNetwork:
 
 @dataclass(frozen=True)
 class FiniteNetwork:
-    """δ_n = |x_j − x_i| − r₀ with the true positions: objective under any rotation.
+    """δ_n = |x_j − x_i| − r₀ with the true positions, δ_t = r₀ (φ − (θ_i + θ_j)/2), φ how far the bond has turned.
+
+    Objective under any rotation of all particles.
 
     Parameters
     ----------
-    arm : (m, 2) array, m; undeformed bond vectors
+    length : (m,) array, m, and direction : (m, 2) array; of undeformed bonds
     pairs : (m, 2) int array
     constraints : Constraints
+    lever : (m,) array, r₀/2 over the radius of the particles; None where bonds do not slide
     """
 
-    arm: np.ndarray
+    length: np.ndarray
+    direction: np.ndarray
     pairs: np.ndarray
     constraints: Constraints
+    lever: np.ndarray | None = None
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
-        relative = self._relative(free, machine)
-        gain = np.sum((2 * self.arm + relative) * relative, axis=1)
-        return gain / (_norm(self.arm + relative) + _norm(self.arm))  # |a + r| − |a| without cancellation
+        moved = self.constraints.moved(free, machine)
+        relative = self._relative(moved)
+        gain = np.sum((2 * self.length[:, None] * self.direction + relative) * relative, axis=1)
+        along = self.length + np.sum(self.direction * relative, axis=1)
+        across = self.direction[:, 0] * relative[:, 1] - self.direction[:, 1] * relative[:, 0]
+        opening = gain / (np.hypot(along, across) + self.length)  # |a + r| − |a| without cancellation
+        if self.lever is None:
+            return opening
+        ends = (moved[self.pairs[:, 0], 2] + moved[self.pairs[:, 1], 2]) * (self.lever / self.length)
+        return np.append(opening, self.length * _least_turn(np.arctan2(across, along) - ends))
 
     def pull(self, force: np.ndarray, free: np.ndarray, machine: float) -> tuple[np.ndarray, float]:
-        vector = force[:, None] * self._direction(free, machine)
-        size = self.constraints.drive.size
-        column = 2 * self.pairs[:, :, None] + np.arange(2)
+        direction, rate = self._present(free, machine)
+        tension, per, size = force[: len(self.pairs)], self.constraints.per, self.constraints.drive.size
+        vector = tension[:, None] * direction
+        if self.lever is not None:
+            shear = force[len(self.pairs) :]
+            vector += (shear * rate)[:, None] * _across(direction)
+        column = per * self.pairs[:, :, None] + np.arange(2)
         nodal = np.bincount(column[:, 1].ravel(), vector.ravel(), size)
         nodal -= np.bincount(column[:, 0].ravel(), vector.ravel(), size)
+        if self.lever is not None:
+            nodal -= np.bincount((3 * self.pairs + 2).ravel(), np.repeat(self.lever * shear, 2), size)
         return self.constraints.expand.T @ nodal, float(self.constraints.drive @ nodal)
 
     def stiffness(self, weight: np.ndarray, free: np.ndarray, machine: float) -> sparse.csc_array:
         """Material part only: the geometric part, force over length, is about 1e-3 of it and may be negative."""
-        jacobian, _ = _jacobian(self._direction(free, machine), self.pairs, self.constraints)
+        direction, rate = self._present(free, machine)
+        full = _jacobian(direction, self.pairs, self.constraints, self.lever, rate)
+        jacobian = (full @ self.constraints.expand).tocsr()
         return (jacobian.T @ (jacobian * weight[:, None])).tocsc()
 
     def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
@@ -111,36 +136,60 @@ class FiniteNetwork:
     def energy(self, free: np.ndarray, machine: float) -> float:
         return 0.0
 
-    def _relative(self, free: np.ndarray, machine: float) -> np.ndarray:
-        moved = self.constraints.displacement(free, machine)
-        return moved[self.pairs[:, 1]] - moved[self.pairs[:, 0]]
+    def _relative(self, moved: np.ndarray) -> np.ndarray:
+        """u_j − u_i (m, 2), m, of degrees of freedom (n, per), m."""
+        place = np.ascontiguousarray(moved[:, :2])
+        return place[self.pairs[:, 1]] - place[self.pairs[:, 0]]
 
-    def _direction(self, free: np.ndarray, machine: float) -> np.ndarray:
-        now = self.arm + self._relative(free, machine)
-        return now / _norm(now)[:, None]
+    def _present(self, free: np.ndarray, machine: float) -> tuple[np.ndarray, np.ndarray]:
+        """Direction (m, 2) of bonds now, and their first length over that now (m,)."""
+        now = self.length[:, None] * self.direction + self._relative(self.constraints.moved(free, machine))
+        distance = np.hypot(now[:, 0], now[:, 1])
+        return now / distance[:, None], self.length / distance
 
 
 def whole_network(problem: Problem) -> tuple[SmallNetwork | FiniteNetwork, Constraints]:
     """The bond network of a problem with its grips eliminated, and the change of variables."""
-    constraints = eliminate(problem.grips, problem.particles.count)
+    slides = isinstance(problem.law, SlidingLaw)
+    constraints = eliminate(problem.grips, problem.particles.count, 3 if slides else 2)
     length, direction = problem.bonds.reference(problem.particles.position)
     pairs = problem.bonds.pairs.astype(np.int64)
+    lever = length / (2 * problem.particles.radius) if slides else None
     if problem.kinematics == Kinematics.FINITE:
-        return FiniteNetwork(length[:, None] * direction, pairs, constraints), constraints
-    jacobian, drive = _jacobian(direction, pairs, constraints)
-    return SmallNetwork(jacobian, jacobian.T.tocsr(), drive), constraints
+        return FiniteNetwork(length, direction, pairs, constraints, lever), constraints
+    full = _jacobian(direction, pairs, constraints, lever)
+    jacobian = (full @ constraints.expand).tocsr()
+    return SmallNetwork(jacobian, jacobian.T.tocsr(), full @ constraints.drive), constraints
 
 
 def _jacobian(
-    direction: np.ndarray, pairs: np.ndarray, constraints: Constraints
-) -> tuple[sparse.csr_array, np.ndarray]:
-    """∂δ/∂q (m, q) and ∂δ/∂s (m,) for bond directions (m, 2)."""
-    column = (2 * pairs[:, :, None] + np.arange(2)).reshape(-1)
-    value = np.stack([-direction, direction], axis=1).reshape(-1)
-    row = np.repeat(np.arange(len(pairs)), 4)
-    full = sparse.coo_array((value, (row, column)), shape=(len(pairs), constraints.drive.size)).tocsr()
-    return (full @ constraints.expand).tocsr(), full @ constraints.drive
+    direction: np.ndarray,
+    pairs: np.ndarray,
+    constraints: Constraints,
+    lever: np.ndarray | None,
+    rate: np.ndarray | None = None,
+) -> sparse.csr_array:
+    """What bonds along `direction` (m, 2) are deformed by a unit of every degree of freedom.
+
+    They slide by `rate` (m,) for a unit across them, 1 if there is none, and by −`lever` (m,) for a unit of their ends'
+    rotation.
+    """
+    parts = [np.hstack([-direction, direction])]
+    if lever is not None:
+        turn, across = -lever[:, None], _across(direction) if rate is None else rate[:, None] * _across(direction)
+        none = np.zeros_like(turn)
+        parts = [np.hstack([-direction, none, direction, none]), np.hstack([-across, turn, across, turn])]
+    value, per, size = np.vstack(parts), constraints.per, constraints.drive.size
+    column = (per * pairs[:, :, None] + np.arange(per)).reshape(len(pairs), -1)
+    start = np.arange(0, value.size + 1, 2 * per)
+    return sparse.csr_array((value.ravel(), np.tile(column, (len(parts), 1)).ravel(), start), shape=(len(value), size))
 
 
-def _norm(vector: np.ndarray) -> np.ndarray:
-    return np.hypot(vector[:, 0], vector[:, 1])
+def _across(direction: np.ndarray) -> np.ndarray:
+    """Directions (m, 2) turned by a right angle."""
+    return np.column_stack([-direction[:, 1], direction[:, 0]])
+
+
+def _least_turn(angle: np.ndarray) -> np.ndarray:
+    """The same turn (m,), rad, less whole ones: between −π and π."""
+    return np.where(np.abs(angle) < np.pi, angle, angle - 2 * np.pi * np.rint(angle / (2 * np.pi)))
