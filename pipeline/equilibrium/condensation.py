@@ -19,6 +19,7 @@ from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
 from pipeline.materials.cohesive import CentralSoftening
+from pipeline.materials.memory import CentralMemory
 
 BATCH = 64  # right-hand sides at a time
 
@@ -161,16 +162,19 @@ class CondensedModel:
         """A state of the whole model in the variables of this one."""
         kept, bonds, islands = state.free[self.kept], self.bonds, self.network.islands
         moved = np.append(kept[self.network.edge], state.machine)
-        extra = state.opening[islands.index] - islands.opening(moved, np.zeros(islands.count))
-        return replace(state, free=np.append(kept, extra), opening=state.opening[bonds], reached=state.reached[bonds])
+        opening, reached = state.memory.opening, state.memory.reached
+        extra = opening[islands.index] - islands.opening(moved, np.zeros(islands.count))
+        memory = CentralMemory(self.law, opening[bonds], reached[bonds])
+        return replace(state, free=np.append(kept, extra), memory=memory)
 
     def expand(self, state: State) -> State:
         """A state of this model in the variables of the whole one; far bonds never opened farther than now."""
         free = self.complete(state.free, state.machine)
         opening = self.whole.network.opening(free, state.machine)
         reached = np.maximum(opening, 0.0)
-        reached[self.bonds] = state.reached
-        return replace(state, free=free, opening=opening, reached=reached)
+        reached[self.bonds] = state.memory.reached
+        _, law = _divisible(self.whole)
+        return replace(state, free=free, memory=CentralMemory(law, opening, reached))
 
     def usage(self, state: State) -> np.ndarray:
         """Opening of every far bond (m,) as a share of its δ_peak in a state of this model; 0 for active bonds."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from pipeline.core.problem import Problem
+from pipeline.core.problem import BondLaw, Problem
 from pipeline.equilibrium.constraints import Constraints
 from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
-from pipeline.materials.cohesive import CentralSoftening, central_law
+from pipeline.materials.cohesive import central_law
+from pipeline.materials.memory import Memory, at_rest
 
 
 class Model(Protocol):
@@ -19,7 +20,7 @@ class Model(Protocol):
     @property
     def network(self) -> Network: ...
     @property
-    def law(self) -> CentralSoftening: ...
+    def law(self) -> BondLaw: ...
     @property
     def gauge(self) -> np.ndarray: ...
     @property
@@ -32,14 +33,14 @@ class WholeModel:
 
     Parameters
     ----------
-    law : CentralSoftening
+    law : BondLaw
     network : SmallNetwork or FiniteNetwork
     constraints : Constraints
     gauge : (q,) array, ∂CMOD/∂q
     gauge_drive : float, ∂CMOD/∂s
     """
 
-    law: CentralSoftening
+    law: BondLaw
     network: SmallNetwork | FiniteNetwork
     constraints: Constraints
     gauge: np.ndarray
@@ -69,7 +70,7 @@ class State:
     ----------
     free : (q,) array, m; machine : float, m; the variables
     load : float, N; machine load; cmod : float, m
-    opening, reached : (m,) arrays, m, of the model's bonds
+    memory : Memory; the model's bonds
     energy : float, J; stored and used up
     residual : float, N; largest force out of balance on a free variable
     error : float; estimated relative error of the displacements
@@ -80,30 +81,47 @@ class State:
     machine: float
     load: float
     cmod: float
-    opening: np.ndarray
-    reached: np.ndarray
+    memory: Memory
     energy: float = 0.0
     residual: float = 0.0
     error: float = 0.0
     iterations: int = 0
 
 
+@dataclass(frozen=True)
+class ElasticResponse:
+    """What an undamaged specimen does per metre of machine displacement.
+
+    Parameters
+    ----------
+    free : (q,) array; variables
+    load : float, N/m; cmod : float
+    deformation : (k,) array; of the model's bonds
+    """
+
+    free: np.ndarray
+    load: float
+    cmod: float
+    deformation: np.ndarray
+
+    @property
+    def energy(self) -> float:
+        """J/m²."""
+        return self.load / 2
+
+
 def rest(model: Model) -> State:
     """The unloaded specimen."""
-    bonds = np.zeros(model.law.k_n.size)
-    return State(np.zeros(model.gauge.size), 0.0, 0.0, 0.0, bonds, bonds)
+    return State(np.zeros(model.gauge.size), 0.0, 0.0, 0.0, at_rest(model.law))
 
 
-def scaled(state: State, factor: float) -> State:
-    """A linear elastic state, scaled."""
-    opening = factor * state.opening
-    return replace(
-        state,
-        free=factor * state.free,
-        machine=factor * state.machine,
-        load=factor * state.load,
-        cmod=factor * state.cmod,
-        opening=opening,
-        reached=np.maximum(opening, 0.0),
-        energy=factor**2 * state.energy,
+def moved_at_once(model: Model, response: ElasticResponse, machine: float) -> State:
+    """The specimen after a machine displacement, m, that damages nothing and takes no time."""
+    return State(
+        free=machine * response.free,
+        machine=machine,
+        load=machine * response.load,
+        cmod=machine * response.cmod,
+        memory=at_rest(model.law).settled(machine * response.deformation, 0.0),
+        energy=machine**2 * response.energy,
     )

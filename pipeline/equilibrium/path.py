@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.equilibrium.model import State, rest, scaled
+from pipeline.equilibrium.model import ElasticResponse, State, moved_at_once, rest
 from pipeline.equilibrium.step import Stepper
 
 HALVINGS = 4  # of an increment in which load or energy leap, before that is taken for a jump
@@ -70,18 +70,13 @@ class Path:
     peak: float = field(default=0.0)
     _stiff: float = field(default=1.0)  # machine displacement a CMOD while elastic
 
-    def begin(self, elastic: State) -> tuple[State, State]:
-        """Rest, and the state at which the first bond starts to soften or a first elastic increment ends.
-
-        Parameters
-        ----------
-        elastic : State; the linear elastic state at any machine displacement
-        """
-        law = self.stepper.model.law
-        usage = float(np.max(elastic.opening / law.delta_peak, initial=0.0))
-        self._stiff = elastic.machine / elastic.cmod
-        factor = 4 * self.increments.far * self.last / elastic.cmod
-        return rest(self.stepper.model), scaled(elastic, min(factor, 1 / usage) if usage > 0 else factor)
+    def begin(self, elastic: ElasticResponse) -> tuple[State, State]:
+        """Rest, and the state at which the first bond starts to soften or a first elastic increment ends."""
+        model = self.stepper.model
+        usage = float(np.max(elastic.deformation / model.law.delta_peak, initial=0.0))
+        self._stiff = 1 / elastic.cmod
+        machine = 4 * self.increments.far * self.last / elastic.cmod
+        return rest(model), moved_at_once(model, elastic, min(machine, 1 / usage) if usage > 0 else machine)
 
     def done(self, state: State) -> bool:
         """Whether the last CMOD is reached."""

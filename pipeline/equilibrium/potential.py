@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.equilibrium.factor import Solve
 from pipeline.equilibrium.network import Network
-from pipeline.materials.cohesive import CentralSoftening
-from pipeline.materials.softening import Unloading
+from pipeline.materials.memory import Memory
+from pipeline.materials.trial import Trial
 
 SOFTENING_SHARE = 0.2  # of the secant stiffness of softening bonds; 1 needs a fifth more iterations, 0.03 no fewer
-FLOOR = 1e-6  # of K^n: left to broken bonds in the preconditioner, which loose particles would make singular
+FLOOR = 1e-6  # of the elastic stiffness: left to broken bonds, whose loose particles would make the factors singular
 
 
 @dataclass(frozen=True)
@@ -22,29 +22,34 @@ class Potential:
     Parameters
     ----------
     network : Network
-    law : CohesiveLaw of the same bonds
-    reached : (m,) array, m; largest opening before the increment
+    memory : Memory of the same bonds before the increment
+    duration : float, s; how long the increment takes in the test
     """
 
     network: Network
-    law: CentralSoftening
-    reached: np.ndarray
+    memory: Memory
+    duration: float = 0.0
+    trial: Trial = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trial", self.memory.trial(self.duration))
 
     def gradient(self, free: np.ndarray, machine: float) -> np.ndarray:
         """∂Π/∂q (q,), N."""
         return self.state(free, machine)[0]
 
     def state(self, free: np.ndarray, machine: float) -> tuple[np.ndarray, float, np.ndarray]:
-        """∂Π/∂q (q,), N; ∂Π/∂s, the machine's load, N; openings (m,), m."""
-        opening = self.network.opening(free, machine)
-        force = self.law.force(opening, self.reached)
-        return *self.network.pull(force, free, machine), opening
+        """∂Π/∂q (q,), N; ∂Π/∂s, the machine's load, N; deformation (k,), m, of the bonds."""
+        deformation = self.network.opening(free, machine)
+        return *self.network.pull(self.trial.force(deformation), free, machine), deformation
 
-    def energy(self, free: np.ndarray, machine: float, opening: np.ndarray) -> float:
-        """Stored and used-up energy, J, with the openings (m,), m, of that state."""
-        reached = np.maximum(opening, self.reached)
-        bonds = float(self.law.stored(opening, reached).sum() + self.law.dissipated(reached).sum())
-        return bonds + self.network.energy(free, machine)
+    def settled(self, deformation: np.ndarray) -> Memory:
+        """The bonds after the increment, which ended at the deformation (k,), m."""
+        return self.memory.settled(deformation, self.duration)
+
+    def energy(self, free: np.ndarray, machine: float, memory: Memory) -> float:
+        """Stored and used-up energy, J, with the bonds as they are in that state."""
+        return float(memory.stored.sum() + memory.used.sum()) + self.network.energy(free, machine)
 
     def measure(self, free: np.ndarray, machine: float) -> Solve:
         """Steps by a stiffness that stands for the Hessian: positive definite.
@@ -52,15 +57,10 @@ class Potential:
         Force over opening for every bond, but a share of it for bonds on their softening branch: their
         tangent is negative. All of it would majorise the potential, and is stiffer than needed.
         """
-        opening = self.network.opening(free, machine)
-        at = np.where(opening > 0, opening, 1.0)
-        force = self.law.force(at, self.reached)
-        weight = np.where(opening > 0, force / at, self.law.k_n)
-        if self.law.unloading is Unloading.ELASTIC:
-            weight = np.where((opening > 0) & (opening < self.reached) & (force > 0), self.law.k_n, weight)
-        softening = (opening > self.law.delta_peak) & (opening >= self.reached)
-        weight = np.where(softening, SOFTENING_SHARE * weight, weight)
-        return self.network.measure(np.maximum(weight, FLOOR * self.law.k_n), free, machine)
+        deformation = self.network.opening(free, machine)
+        weight = self.trial.secant(deformation)
+        weight = np.where(self.trial.softening(deformation), SOFTENING_SHARE * weight, weight)
+        return self.network.measure(np.maximum(weight, FLOOR * self.trial.elastic), free, machine)
 
 
 @dataclass

@@ -10,7 +10,6 @@ import numpy as np
 from pipeline.core.curve import LoadCurve
 from pipeline.core.problem import EnergyBalance, Problem, Solution
 from pipeline.equilibrium.model import State
-from pipeline.materials.cohesive import central_law
 
 Fields = Callable[[State], np.ndarray]
 
@@ -61,11 +60,10 @@ class Record:
         What was set free where the crack jumped, `released` (J), is counted as taken out by damping.
         """
         machine, _, load = np.asarray(self.rows).T
-        law = central_law(self.problem.law, "equilibrium")
         return EnergyBalance(
             external=float(np.trapezoid(load, machine)),
-            stored=float(law.stored(state.opening, state.reached).sum()),
-            dissipated=float(law.dissipated(state.reached).sum()),
+            stored=float(state.memory.stored.sum()),
+            dissipated=float(state.memory.used.sum()),
             damping=released,
         )
 
@@ -76,7 +74,7 @@ class Record:
             curve=self.curve(),
             cmod=self.problem.stations[: len(self.frames)],
             displacement=np.array(self.frames).reshape(-1, n, 2),
-            reached=state.reached,
+            reached=state.memory.reached,
             energy=self.energy(state, released),
             quasi_static_error=self.error,
             steps=len(self.rows) - 1,

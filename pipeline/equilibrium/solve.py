@@ -92,7 +92,7 @@ class _Journey:
         stepper = Stepper(self.whole, limit=limit)
         self.path = Path(stepper, problem.cmod_max, problem.stations, increments, snap_back)
         self.before, self.state = self.path.begin(elastic)
-        stepper.tolerance = tolerance * _reference_force(problem, self.state.opening)
+        stepper.tolerance = tolerance * _reference_force(problem, self.state.memory.opening)
         for state, before in ((self.before, None), (self.state, self.before)):
             self.record.add(state, before, self.fields)
         self.watch, self.looked = Watch(), 1

@@ -8,8 +8,9 @@ import numpy as np
 
 from pipeline.equilibrium.factor import factorise_elastic
 from pipeline.equilibrium.minimise import Minimum, minimise
-from pipeline.equilibrium.model import Model, State
+from pipeline.equilibrium.model import ElasticResponse, Model, State
 from pipeline.equilibrium.potential import Potential, SecantPreconditioner
+from pipeline.materials.memory import Memory, at_rest
 
 
 @dataclass
@@ -37,20 +38,20 @@ class Stepper:
         """The same stepper for another model."""
         return Stepper(model, self.tolerance, self.limit, self.patience, self.endurance)
 
-    def elastic(self) -> State:
-        """The linear elastic state at a machine displacement of 1 m: only a direction and a compliance."""
+    def elastic(self) -> ElasticResponse:
+        """How the undamaged specimen answers a motion of the machine that takes no time."""
         zero = np.zeros(self.model.gauge.size)
-        network, stiffness = self.model.network, self.model.law.k_n
+        network, stiffness = self.model.network, at_rest(self.model.law).trial(0.0).elastic
         tiny = 1e-9  # a motion so small that true lengths are linear in it
         pull, _ = network.pull(stiffness * network.opening(zero, tiny), zero, 0.0)
         free = -factorise_elastic(network.stiffness(stiffness, zero, 0.0)).solve(pull) / tiny
-        opening = network.opening(tiny * free, tiny) / tiny
-        _, load = network.pull(stiffness * opening, zero, 0.0)
-        return State(free, 1.0, load, self._cmod(free, 1.0), opening, np.maximum(opening, 0.0), load / 2)
+        deformation = network.opening(tiny * free, tiny) / tiny
+        _, load = network.pull(stiffness * deformation, zero, 0.0)
+        return ElasticResponse(free, load, self._cmod(free, 1.0), deformation)
 
     def by_machine(self, start: State, guess: np.ndarray, machine: float) -> State | None:
         """The equilibrium at a machine displacement; None where none was found."""
-        found, potential = self._minimum(start.reached, guess, machine, self.tolerance, None)
+        found, potential = self._minimum(start.memory, guess, machine, self.tolerance, None)
         return self._state(found, potential, machine) if found.converged else None
 
     def by_gauge(self, start: State, guess: np.ndarray, machine: float, cmod: float) -> State | None:
@@ -61,7 +62,7 @@ class Stepper:
         for _ in range(15):
             miss = cmod - self._cmod(guess, machine)
             guess = guess + gauge * (miss / (gauge @ gauge))
-            found, potential = self._minimum(start.reached, guess, machine, 0.5 * self.tolerance, gauge)
+            found, potential = self._minimum(start.memory, guess, machine, 0.5 * self.tolerance, gauge)
             if not found.converged:
                 return None
             if abs(found.multiplier) * np.abs(gauge).max() <= 0.5 * self.tolerance:
@@ -71,9 +72,9 @@ class Stepper:
         return None
 
     def _minimum(
-        self, reached: np.ndarray, guess: np.ndarray, machine: float, tolerance: float, constraint: np.ndarray | None
+        self, memory: Memory, guess: np.ndarray, machine: float, tolerance: float, constraint: np.ndarray | None
     ) -> tuple[Minimum, Potential]:
-        potential = Potential(self.model.network, self.model.law, reached)
+        potential = Potential(self.model.network, memory)
         self._preconditioner.move(potential, machine)
         if self._preconditioner.factor is None or self._spent >= self.endurance:
             self._preconditioner.renew(guess)
@@ -91,16 +92,16 @@ class Stepper:
         return found, potential
 
     def _state(self, found: Minimum, potential: Potential, machine: float) -> State:
-        gradient, load, opening = potential.state(found.at, machine)
+        gradient, load, deformation = potential.state(found.at, machine)
+        memory = potential.settled(deformation)
         size = float(np.linalg.norm(found.at))
         return State(
             free=found.at,
             machine=machine,
             load=load,
             cmod=self._cmod(found.at, machine),
-            opening=opening,
-            reached=np.maximum(opening, potential.reached),
-            energy=potential.energy(found.at, machine, opening),
+            memory=memory,
+            energy=potential.energy(found.at, machine, memory),
             residual=float(np.abs(gradient).max()),
             error=float(np.linalg.norm(found.step)) / size if size else 0.0,
             iterations=found.iterations,

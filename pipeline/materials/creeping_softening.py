@@ -83,9 +83,16 @@ class CreepingSoftening:
 
     def onset(self, state: BondState, duration: float) -> np.ndarray:
         """δ* (m,), m: where softening has begun, or would begin in a step of `duration` s."""
+        kept, stiffness = self.rising(state, duration)
+        return np.where(state.softened, state.onset, state.opening + (self.f_max - kept) / stiffness)
+
+    def rising(self, state: BondState, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Force (m,), N, kept at constant opening for `duration` s, and stiffness (m,), N/m, of what opens meanwhile.
+
+        They hold for bonds that have not softened.
+        """
         kept = history_force(self.rise, state.arms, duration) + self.rise.left * state.opening
-        ahead = state.opening + (self.f_max - kept) / tangent(self.rise, duration)
-        return np.where(state.softened, state.onset, ahead)
+        return kept, tangent(self.rise, duration)
 
     def force(self, state: BondState, opening: np.ndarray, duration: float) -> np.ndarray:
         """Force (m,), N, tension positive, at the end of a step of `duration` s that ends at `opening` (m,), m."""
@@ -93,7 +100,7 @@ class CreepingSoftening:
         softening = state.softened | (opening >= onset)
         arms = relax(self.rise, state.arms, opening - state.opening, duration)
         reached = np.maximum(opening, state.reached)
-        return np.where(softening, self._softened(opening, reached, onset), total(self.rise, arms, opening))
+        return np.where(softening, self.softened_force(opening, reached, onset), total(self.rise, arms, opening))
 
     def advance(self, state: BondState, opening: np.ndarray, duration: float) -> BondState:
         """The state after a step of `duration` s that ends at `opening` (m,), m."""
@@ -157,7 +164,7 @@ class CreepingSoftening:
 
     def stored(self, state: BondState) -> np.ndarray:
         """Recoverable energy (m,), J: of the arms' springs; once softened ½ f δ, or f²/(2 K(0)) if elastic."""
-        force = self._softened(state.opening, state.reached, state.onset)
+        force = self.softened_force(state.opening, state.reached, state.onset)
         half = force / self.k_n if self.unloading is Unloading.ELASTIC else state.opening
         return np.where(state.softened, 0.5 * half * force, stored(self.rise, state.arms, state.opening))
 
@@ -182,7 +189,7 @@ class CreepingSoftening:
         used = crept(self.rise, state.arms, opening - state.opening, duration)
         return np.where(state.softened | (opening >= self.onset(state, duration)), 0.0, used)
 
-    def _softened(self, opening: np.ndarray, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
+    def softened_force(self, opening: np.ndarray, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """Force (m,), N, of softened bonds: secant or elastic in tension, K(0) in compression."""
         pulled = opening > 0
         envelope = self.envelope(reached, onset)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.problem import Grip
+from pipeline.materials.memory import Memory, at_rest
 from pipeline.reference.body import Body
-from pipeline.reference.memory import Memory, at_rest
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from pipeline.explicit.modes import shear_stiffness
 from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.plugin import open_lammps
 from pipeline.materials.creeping_softening import BondState, CreepingSoftening
+from pipeline.materials.memory import CentralMemory, CreepingMemory, Memory, MixedMemory, at_rest
 from pipeline.materials.mixed_softening import MixedSoftening, MixedState
-from pipeline.reference.memory import CentralMemory, CreepingMemory, Memory, MixedMemory, at_rest
 
 GLOBAL, LOCAL = 0, 2  # styles of fixes and computes in the LAMMPS library
 VECTOR, ARRAY = 1, 2  # types

@@ -12,13 +12,15 @@ from pipeline.core.problem import BondLaw
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.creeping_softening import BondState, CreepingSoftening
 from pipeline.materials.mixed_softening import MixedSoftening, MixedState
+from pipeline.materials.trial import CentralTrial, CreepingTrial, MixedTrial, Trial
 
 
 class Memory(Protocol):
     """The bonds at one step; arrays (m,), one entry a bond.
 
     `follow` brings them to openings and slidings, m, within `duration` s of the test; `tension` and `shear` are their
-    forces there, N, `stored` and `used` their energies, J, `reached` the largest opening in m, or its like.
+    forces there, N, `stored` and `used` their energies, J, `reached` the largest opening in m, or its like. `trial` is
+    the next step of that duration before its end is known; `settled` follows to the deformation that was found for it.
     """
 
     @property
@@ -34,6 +36,8 @@ class Memory(Protocol):
     @property
     def reached(self) -> np.ndarray: ...
     def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> Memory: ...
+    def trial(self, duration: float) -> Trial: ...
+    def settled(self, deformation: np.ndarray, duration: float) -> Memory: ...
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,12 @@ class CentralMemory:
 
     def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> CentralMemory:
         return replace(self, opening=opening, reached=np.maximum(opening, self.reached))
+
+    def trial(self, duration: float) -> CentralTrial:
+        return CentralTrial(self.law, self.reached)
+
+    def settled(self, deformation: np.ndarray, duration: float) -> CentralMemory:
+        return self.follow(deformation, np.zeros_like(deformation), duration)
 
 
 @dataclass(frozen=True)
@@ -96,6 +106,13 @@ class MixedMemory:
     def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> MixedMemory:
         return replace(self, opening=opening, sliding=sliding, state=self.law.advance(self.state, opening, sliding))
 
+    def trial(self, duration: float) -> MixedTrial:
+        return MixedTrial(self.law, self.state)
+
+    def settled(self, deformation: np.ndarray, duration: float) -> MixedMemory:
+        opening, sliding = np.split(deformation, 2)
+        return self.follow(opening, sliding, duration)
+
 
 @dataclass(frozen=True)
 class CreepingMemory:
@@ -129,6 +146,12 @@ class CreepingMemory:
         after = self.law.advance(self.state, opening, duration)
         return replace(self, state=after, used=self.used + self.law.used(self.state, after, duration))
 
+    def trial(self, duration: float) -> CreepingTrial:
+        return CreepingTrial(self.law, self.state, duration)
+
+    def settled(self, deformation: np.ndarray, duration: float) -> CreepingMemory:
+        return self.follow(deformation, np.zeros_like(deformation), duration)
+
 
 def at_rest(law: BondLaw) -> Memory:
     """Bonds that were never loaded.
@@ -136,7 +159,7 @@ def at_rest(law: BondLaw) -> Memory:
     Raises
     ------
     UnavailableError
-        for a law that this engine does not follow
+        for a law that nobody knows how to follow
     """
     zero = np.zeros(law.k_n.size)
     if isinstance(law, CentralSoftening):
@@ -145,4 +168,4 @@ def at_rest(law: BondLaw) -> Memory:
         return MixedMemory(law, zero, zero, law.at_rest())
     if isinstance(law, CreepingSoftening):
         return CreepingMemory(law, law.at_rest(), zero)
-    raise UnavailableError(f"the engine reference does not follow the law {type(law).__name__}")
+    raise UnavailableError(f"it is not known what bonds with the law {type(law).__name__} remember")
