@@ -92,6 +92,11 @@ class RunSettings(BaseModel):
         description="other placements of the lattice that are simulated at the optimum and averaged; their scatter "
         "is in the interval",
     )
+    scaling: bool = Field(
+        default=False,
+        description="one simulation for all nodes of equal delta_max/f_max, by the scaling law of small kinematics; "
+        "damage in the aggregate is looked for, nodes that have some are simulated by themselves",
+    )
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,
         description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",

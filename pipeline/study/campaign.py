@@ -37,6 +37,7 @@ from pipeline.study.levelling import Leveller, leveller, refuse_unlevelled
 from pipeline.study.observation import at_stations, measured_test, observe_solution
 from pipeline.study.output import results_folder
 from pipeline.study.prospects import refuse_hopeless, refuse_inert
+from pipeline.study.scaling import leading_problem, member_solution, scaling_groups
 
 TRIES = 5  # placements looked at for each that is wanted
 
@@ -81,7 +82,30 @@ class Campaign:
 
     def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """Simulate the nodes that the store does not hold; all of them, in order."""
+        if self.settings.scaling:
+            self._scale(nodes)
         return self.solved([(_told(*node), self.problem(*node)) for node in nodes])
+
+    def _scale(self, nodes: list[tuple[float, float]]) -> None:
+        """Keep what one simulation gives of nodes with the same delta_max/f_max, where that is exact."""
+        leads: list[tuple[str, Problem]] = []
+        followers: list[list[tuple[Problem, float]]] = []
+        for group in scaling_groups(nodes):
+            members = [(self.problem(*nodes[k]), factor) for k, factor in group]
+            if sum(self._missing(problem) for problem, _ in members) < 2:
+                continue
+            leads.append(
+                (_led(nodes[group[0][0]], len(group)), leading_problem(members[0][0], [f for _, f in members]))
+            )
+            followers.append(members)
+        for (lead, found), members in zip(self.solved(leads), followers, strict=True):
+            for problem, factor in members:
+                scaled = member_solution(found, lead, problem, factor)
+                if scaled is not None and self._missing(problem):
+                    self.store.put(problem_key(problem, self.engine.label), scaled)
+
+    def _missing(self, problem: Problem) -> bool:
+        return problem_key(problem, self.engine.label) not in self.store
 
     def solved(self, problems: list[tuple[str, Problem]]) -> list[tuple[Problem, Solution]]:
         """Simulate the named problems that the store does not hold; all of them, in order."""
@@ -129,6 +153,10 @@ class Campaign:
 
 def _told(f_max: float, delta_max: float) -> str:
     return f"f_max = {f_max:.4g} N, delta_max = {delta_max:.4g} m"
+
+
+def _led(node: tuple[float, float], count: int) -> str:
+    return f"{_told(*node)}, for {count} nodes of this ratio"
 
 
 def prepare(

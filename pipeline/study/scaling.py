@@ -9,12 +9,7 @@ import numpy as np
 from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import InputError
 from pipeline.core.problem import BondLaw, EnergyBalance, Kinematics, Problem, Solution
-from pipeline.materials.cohesive import LinearSoftening
-
-
-def scaled_law(law: LinearSoftening, factor: float) -> LinearSoftening:
-    """(s f_max, s δ_max) of every bond."""
-    return LinearSoftening(law.k_n, factor * law.f_max, factor * law.delta_max)
+from pipeline.materials.cohesive import CentralSoftening
 
 
 def scaled_problem(problem: Problem, factor: float) -> Problem:
@@ -25,11 +20,10 @@ def scaled_problem(problem: Problem, factor: float) -> Problem:
     InputError
         where the law of scaling does not hold
     """
-    if problem.kinematics is not Kinematics.SMALL or not isinstance(problem.law, LinearSoftening):
-        raise InputError("solutions are scaled under small kinematics and linear softening only")
+    law = _scalable(problem)
     return replace(
         problem,
-        law=scaled_law(problem.law, factor),
+        law=law.scaled(factor),
         cmod_max=factor * problem.cmod_max,
         stations=factor * problem.stations,
     )
@@ -79,7 +73,13 @@ def leading_problem(problem: Problem, factors: list[float]) -> Problem:
     ----------
     problem : Problem with the law of the group's first node
     factors : of all nodes of the group, from `scaling_groups`: the first is 1
+
+    Raises
+    ------
+    InputError
+        where the law of scaling does not hold
     """
+    _scalable(problem)
     stations = np.unique(np.concatenate([problem.stations / factor for factor in factors]))
     distinct = np.append(True, np.diff(stations) > 1e-9 * stations[-1])
     return replace(problem, cmod_max=problem.cmod_max / min(factors), stations=stations[distinct])
@@ -105,9 +105,21 @@ def member_solution(lead: Solution, leading: Problem, target: Problem, factor: f
     return replace(solution, cmod=target.stations, displacement=solution.displacement[frames])
 
 
+def _scalable(problem: Problem) -> CentralSoftening:
+    """The law of a problem whose solutions can be scaled."""
+    if problem.kinematics is not Kinematics.SMALL or not isinstance(problem.law, CentralSoftening):
+        raise InputError(
+            "solutions are scaled only under small kinematics and for bonds that neither creep nor slide: "
+            "leave `scaling` out"
+        )
+    return problem.law
+
+
 def _untouched(scaled: BondLaw, target: BondLaw, reached: np.ndarray) -> bool:
     """Whether bonds (m,) whose law differs in both stayed elastic in both, having opened up to `reached` (m,), m."""
-    if not isinstance(scaled, LinearSoftening) or not isinstance(target, LinearSoftening):
+    if not isinstance(scaled, CentralSoftening) or not isinstance(target, CentralSoftening):
+        return False
+    if (scaled.softening, scaled.unloading) != (target.softening, target.unloading):
         return False
     if not np.allclose(scaled.k_n, target.k_n, rtol=1e-9, atol=0):
         return False
