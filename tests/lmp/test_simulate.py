@@ -96,12 +96,12 @@ SAME = 1e-8  # asked for; measured 1e-10 to 6e-10: the order of sums differs, so
     ("ranks", "edit"),
     [
         (2, str),
-        (1, lambda deck: deck.replace("newton          on", "newton          off")),
-        (2, lambda deck: deck.replace("newton          on", "newton          off")),
+        (1, lambda deck: deck.replace("newton          off", "newton          on")),
+        (2, lambda deck: deck.replace("newton          off", "newton          on")),
         (1, lambda deck: deck.replace("sort 0 0.0", "sort 100 0.002").replace("check yes", "check no")),
         (2, lambda deck: deck.replace("every 100", "every 50").replace("check yes", "check no")),
     ],
-    ids=["two ranks", "newton off", "two ranks, newton off", "sorted", "two ranks, rebuilt every 50 steps"],
+    ids=["two ranks", "newton on", "two ranks, newton on", "sorted", "two ranks, rebuilt every 50 steps"],
 )
 def test_load_does_not_depend_on_how_it_is_run(
     beam: Problem, record: dict[str, np.ndarray], tmp_path: Path, ranks: int, edit: Edit
@@ -119,7 +119,7 @@ def test_load_does_not_depend_on_how_it_is_run(
 def test_two_threads_begin_alike(beam: Problem, record: dict[str, np.ndarray], tmp_path: Path, newton: str) -> None:
     """Each thread has particles of its own; only the order of sums is another."""
     write_deck(tmp_path, beam)
-    deck = short((tmp_path / DECK).read_text()).replace("newton          on", f"newton          {newton}")
+    deck = short((tmp_path / DECK).read_text()).replace("newton          off", f"newton          {newton}")
     (tmp_path / DECK).write_text(deck)
     run_deck(tmp_path, "-pk", "omp", "2")
     other = read_curve(tmp_path / "curve.txt")

@@ -20,18 +20,18 @@ from .test_simulate import SAME, run_deck
 pytestmark = pytest.mark.slow
 
 Edit = Callable[[str], str]
-NEWTON_OFF: Edit = lambda deck: deck.replace("newton          on", "newton          off")  # noqa: E731
+NEWTON_ON: Edit = lambda deck: deck.replace("newton          off", "newton          on")  # noqa: E731
 SORTED: Edit = lambda deck: deck.replace("sort 0 0.0", "sort 100 0.002")  # noqa: E731
 REBUILT: Edit = lambda deck: deck.replace("every 100 delay 0 check yes", "every 50 delay 0 check no")  # noqa: E731
 TWO_THREADS = ("-pk", "omp", "2")
 WAYS: dict[str, tuple[int, tuple[str, ...], Edit]] = {
-    "newton off": (1, (), NEWTON_OFF),
+    "newton on": (1, (), NEWTON_ON),
     "sorted every 100": (1, (), lambda deck: SORTED(REBUILT(deck))),
     "rebuilt every 50": (1, (), REBUILT),
     "two threads": (1, TWO_THREADS, str),
-    "two threads, newton off": (1, TWO_THREADS, NEWTON_OFF),
+    "two threads, newton on": (1, TWO_THREADS, NEWTON_ON),
     "two ranks": (2, (), str),
-    "two ranks, newton off, rebuilt": (2, (), lambda deck: NEWTON_OFF(REBUILT(deck))),
+    "two ranks, newton on, rebuilt": (2, (), lambda deck: NEWTON_ON(REBUILT(deck))),
     "four ranks": (4, (), lambda deck: re.sub(r"run +\$\{steps_max\} upto", "run 260", deck)),
 }
 LAWS = {"plain": {}, "sliding": OTHERS["sliding"], "creep": OTHERS["creep"]}
