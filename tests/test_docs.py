@@ -168,6 +168,8 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
         cross_check._run_result,
         diagnose_result.diagnosis_result,
         diagnose_result.closure_result,
+        diagnose_result.share_result,
+        diagnose_result.parameters,
     ],
 )
 def test_every_key_of_a_result_is_explained(function):

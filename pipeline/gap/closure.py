@@ -9,11 +9,13 @@ import numpy as np
 
 from pipeline.core.units import UM
 from pipeline.gap.candidate import Candidate, Predict
-from pipeline.gap.fit import Data, best_point
+from pipeline.gap.fit import Data, best_point, jacobian
 from pipeline.gap.observation import STAGES, Observation
 
 DRAWS = 400
 POINT_PARTS = 2
+BOX_PRECISION = 12.0  # one over the variance of a flat distribution of width one
+ACROSS = ("load from field", "field from load")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,26 +42,51 @@ class Distance:
 
 
 @dataclass(frozen=True)
-class Closure:
-    """What a candidate does to held-out data.
+class Share:
+    """The share of a gap that is closed.
 
     Parameters
     ----------
     fraction : float; (g₀ − g₁)/(g₀ − g_floor), NaN where there is nothing to close
     interval : (low, high), 95 %, block bootstrap
-    before, after : Distance over all held-out stages and points
+    before, after : float; g₀ and g₁, scaled
     floor : float; what noise and discrepancy alone leave, scaled
     nothing : bool; g₀ is within two standard deviations of the floor
-    folds : fold's name → before, after; also field from load and load from field
     """
 
     fraction: float
     interval: tuple[float, float]
-    before: Distance
-    after: Distance
+    before: float
+    after: float
     floor: float
     nothing: bool
+
+
+@dataclass(frozen=True)
+class Closure:
+    """What a candidate does to held-out data.
+
+    Parameters
+    ----------
+    whole : Share of all data
+    channels : "field" and "load" → Share, of those that are there
+    before, after : Distance over all held-out stages and points
+    folds : fold's name → before, after; also field from load and load from field
+    """
+
+    whole: Share
+    channels: Mapping[str, Share]
+    before: Distance
+    after: Distance
     folds: Mapping[str, tuple[Distance, Distance]]
+
+    @property
+    def fraction(self) -> float:
+        return self.whole.fraction
+
+    @property
+    def nothing(self) -> bool:
+        return self.whole.nothing
 
 
 def folds(observation: Observation) -> tuple[list[Fold], list[Fold]]:
@@ -76,7 +103,7 @@ def folds(observation: Observation) -> tuple[list[Fold], list[Fold]]:
     is_field = point >= 0
     for part in range(POINT_PARTS):
         within.append(Fold(f"points {part + 1}", is_field & (order[point] % POINT_PARTS == part)))
-    across = [Fold("load from field", ~is_field), Fold("field from load", is_field)]
+    across = [Fold(name, held) for name, held in zip(ACROSS, (~is_field, is_field), strict=True)]
     return [f for f in within if _usable(f)], [f for f in across if _usable(f)]
 
 
@@ -112,8 +139,45 @@ def _part(predict: Predict, keep: np.ndarray) -> Predict:
     return lambda parameters, amplitudes: predict(parameters, amplitudes)[keep]
 
 
+def left_by_complete(
+    candidate: Candidate, data: Data, chosen: list[Fold], at: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """What a model that lacks nothing leaves at data it was not fitted to: what closure is counted from.
+
+    Draws of noise and discrepancy go through the same fits without every fold, linear about `at`; a parameter that the
+    rest does not determine stays within its box.
+
+    Parameters
+    ----------
+    candidate : Candidate without effects
+    data, chosen : as of `held_out`
+    at : (q,) array; its best parameters
+    rng : numpy Generator
+
+    Returns
+    -------
+    (folds, n, draws) array, in the units of the data, NaN where not held out
+    """
+    root = np.linalg.cholesky(data.metric.covariance)
+    waves = root @ rng.standard_normal((len(root), DRAWS))
+    slopes = root @ jacobian(candidate, data, at, np.arange(len(at))) * data.width
+    found = np.full((len(chosen), *waves.shape), np.nan)
+    for k, fold in enumerate(chosen):
+        rest = ~fold.held
+        white = data.metric.part(rest).white(np.hstack([slopes[rest], waves[rest]]))
+        there, wave = white[:, : len(at)], white[:, len(at) :]
+        moved = np.linalg.solve(there.T @ there + BOX_PRECISION * np.eye(len(at)), there.T @ wave)
+        found[k, fold.held] = (waves - slopes @ moved)[fold.held]
+    return found
+
+
 def closure(
-    observation: Observation, data: Data, none: HeldOut, candidate: HeldOut, rng: np.random.Generator
+    observation: Observation,
+    data: Data,
+    none: HeldOut,
+    candidate: HeldOut,
+    complete: np.ndarray,
+    rng: np.random.Generator,
 ) -> Closure:
     """Compare a candidate with the model as it is, both at held-out data.
 
@@ -122,30 +186,42 @@ def closure(
     observation : Observation
     data : Data of all that is there
     none, candidate : HeldOut
-    rng : numpy Generator; of bootstrap and floor
+    complete : (folds, n, draws) array of `left_by_complete`; folds as of `none`, those from channel to channel left out
+    rng : numpy Generator; of the bootstrap
     """
     std, is_field = data.metric.std, _is_field(observation)
-    within = [n for n in none.differences if n not in ("load from field", "field from load")]
+    within = [n for n in none.differences if n not in ACROSS]
     before, after = (np.array([h.differences[n] for n in within]) / std for h in (none, candidate))
-    block = _blocks(observation)
-    g0, g1 = _rms(before), _rms(after)
-    floors = _floors(data, rng)
-    floor, spread = float(floors.mean()), float(floors.std())
-    nothing = bool(g0 - floor < 2 * spread)
-    low, high = _bootstrap(before, after, block, floor, rng)
+    block, waves = _blocks(observation), complete / std[:, None]
+    channels = {"field": is_field, "load": ~is_field}
     table = {
         name: tuple(_distance(h.differences[name], std, is_field) for h in (none, candidate))
         for name in none.differences
     }
     return Closure(
-        fraction=float("nan") if nothing else (g0 - g1) / (g0 - floor),
-        interval=(float("nan"), float("nan")) if nothing else (low, high),
+        whole=_share(before, after, block, waves, rng),
+        channels={
+            name: _share(before[:, part], after[:, part], block[part], waves[:, part], rng)
+            for name, part in channels.items()
+            if np.isfinite(before[:, part]).any()
+        },
         before=_distance(before * std, std, is_field),
         after=_distance(after * std, std, is_field),
-        floor=floor,
-        nothing=nothing,
         folds={name: (one, two) for name, (one, two) in table.items()},
     )
+
+
+def _share(
+    before: np.ndarray, after: np.ndarray, block: np.ndarray, waves: np.ndarray, rng: np.random.Generator
+) -> Share:
+    """What is closed of scaled differences (folds, n), against a complete model's (folds, n, draws)."""
+    g0, g1 = _rms(before), _rms(after)
+    floors = np.sqrt(np.nanmean(waves**2, axis=(0, 1)))
+    floor = float(floors.mean())
+    if g0 - floor < 2 * float(floors.std()):
+        return Share(float("nan"), (float("nan"), float("nan")), g0, g1, floor, True)
+    drawn = _bootstrap(before, after, np.unique(block, return_inverse=True)[1], floor, rng)
+    return Share((g0 - g1) / (g0 - floor), drawn, g0, g1, floor, False)
 
 
 def _rms(values: np.ndarray) -> float:
@@ -170,13 +246,6 @@ def _blocks(observation: Observation) -> np.ndarray:
     stage = np.concatenate([np.repeat(o.sight.stage, 2 * p), o.sight.stage])
     point = np.concatenate([np.tile(np.repeat(np.arange(p), 2), s), np.full(s, p)])
     return np.unique((stage * (p + 1) + point)[o.mask], return_inverse=True)[1]
-
-
-def _floors(data: Data, rng: np.random.Generator) -> np.ndarray:
-    """Scaled distance of a model that lacks nothing, `DRAWS` times."""
-    root = np.linalg.cholesky(data.metric.covariance)
-    waves = root @ rng.standard_normal((len(root), DRAWS)) / data.metric.std[:, None]
-    return np.sqrt(np.mean(waves**2, axis=0))
 
 
 def _bootstrap(

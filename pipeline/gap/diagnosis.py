@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.closure import Closure, closure, folds, held_out
+from pipeline.gap.closure import Closure, closure, folds, held_out, left_by_complete
 from pipeline.gap.effect import MeasurementEffect
 from pipeline.gap.effects import effect, library
 from pipeline.gap.emulator import Emulator, Signature
@@ -17,6 +17,7 @@ from pipeline.gap.gate import Gate, gate
 from pipeline.gap.identifiability import Card, card
 from pipeline.gap.library import Entry
 from pipeline.gap.metric import Metric
+from pipeline.gap.noise import noise_bic
 from pipeline.gap.observation import Observation
 from pipeline.gap.response import Abscissae, Response
 from pipeline.gap.score import NONE, Scored, pairs, score
@@ -63,6 +64,7 @@ class Diagnosis:
     gate : Gate
     cells : list of Cell; the table of where, for the model as it is
     closures : label → Closure, of the best explanations
+    noise_bic : label → BIC against white noise alone, the smaller the better
     verdict : Verdict
     untested : effect → why it could not be judged
     runs : int; different simulations asked for
@@ -77,6 +79,7 @@ class Diagnosis:
     gate: Gate
     cells: list[Cell]
     closures: Mapping[str, Closure]
+    noise_bic: Mapping[str, float]
     verdict: Verdict
     untested: Mapping[str, str]
     runs: int
@@ -178,6 +181,7 @@ def concluded(
         gate=judged,
         cells=where(observation, residual, data.metric.covariance),
         closures=closures(observation, data, fits, scored, rng),
+        noise_bic=noise_bic(observation, data, fits),
         verdict=verdict(scored, table, judged),
         untested=untested,
         runs=runs,
@@ -335,9 +339,11 @@ def closures(
     within, across = folds(observation)
     if not within:
         return {}
-    none = held_out(fits[NONE].candidate, data, within + across, fits[NONE].parameters)
+    best = fits[NONE]
+    none = held_out(best.candidate, data, within + across, best.parameters)
+    complete = left_by_complete(best.candidate, data, within, best.parameters, rng)
     found = {}
     for label in [label for label in scored.ranked() if label != NONE][:CLOSED]:
         other = held_out(fits[label].candidate, data, within + across, fits[label].parameters)
-        found[label] = closure(observation, data, none, other, rng.spawn(1)[0])
+        found[label] = closure(observation, data, none, other, complete, rng.spawn(1)[0])
     return found

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtri
 
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.metric import Metric
@@ -85,6 +85,16 @@ class Fitted:
         tail = (1 - share) / 2
         return np.array([_quantiles(v, weights, (tail, 1 - tail)) for v in values.T]).reshape(-1, 2)
 
+    def parameter_interval(self, share: float = 0.95, temperature: float = 1.0) -> np.ndarray:
+        """Bounds (q, 2) of the parameters, normal about the best point, amplitudes free within their prior."""
+        pull = np.concatenate([np.zeros(self.parameters.size), [1 / m.scale for m in self.candidate.components]])
+        rows = np.vstack([self.jacobian / np.sqrt(temperature), np.diag(pull)[self.parameters.size :]])
+        unit = np.linalg.norm(rows, axis=0)
+        unit = np.where(unit > 0, unit, 1.0)  # what the data do not see at all has no bound that matters here
+        std = np.sqrt(np.diag(np.linalg.pinv((rows / unit).T @ (rows / unit), rcond=1e-12)))[: self.parameters.size]
+        half = ndtri(0.5 + share / 2) * std / unit[: self.parameters.size]
+        return self.parameters[:, None] + half[:, None] * (-1.0, 1.0)
+
     def tempered(self, temperature: float) -> np.ndarray:
         """The weights (j,) when the likelihood counts only to the power of 1/temperature."""
         if temperature == 1:
@@ -138,9 +148,9 @@ def best_point(candidate: Candidate, data: Data, start: np.ndarray | None = None
     """Where a candidate fits best, from several starts; arguments as of `fit`."""
     centre = data.box.mean(axis=1) if start is None else np.asarray(start, float)
     k = len(candidate.bounds)
-    best = _climb(candidate, data, np.append(centre, np.zeros(k)))
+    best = climbed(candidate, data, np.append(centre, np.zeros(k)))
     for node in _coarse(candidate, STARTS + 2 if k == 1 else STARTS):
-        found = _climb(candidate, data, np.append(_profiled(best, data), node))
+        found = climbed(candidate, data, np.append(_profiled(best, data), node))
         best = min(best, found, key=lambda point: _cost(candidate, data, point))
     return best
 
@@ -176,8 +186,8 @@ def _scales(candidate: Candidate, data: Data) -> np.ndarray:
     return np.concatenate([data.width, [min(m.scale, m.high) for m in candidate.components]])
 
 
-def _climb(candidate: Candidate, data: Data, at: np.ndarray, turns: int = 12) -> Point:
-    """Gauss–Newton with bounds and step halving; the prior draws amplitudes to none."""
+def climbed(candidate: Candidate, data: Data, at: np.ndarray, turns: int = 12) -> Point:
+    """Gauss–Newton from `at` (q + k,) with bounds and step halving; the prior draws amplitudes to none."""
     q = len(data.box)
     free = np.arange(at.size)
     bounds = np.vstack([data.box, candidate.bounds])

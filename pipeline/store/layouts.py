@@ -94,6 +94,38 @@ IDENTIFY = Layout(
     ),
 )
 
+DIAGNOSE = Layout(
+    "results.h5 of diagnose",
+    (
+        Entry("stations/cmod_m", ("stations",), "m", "CMOD, as the gauge read it, at which is compared"),
+        Entry("stations/time_s", ("stations",), "s", "time of the record there"),
+        Entry("stations/stage", ("stations",), "1", "0 before the peak, 1 about it, 2 in the tail", "int8"),
+        Entry("points_m", ("points", 2), "m", "where displacements are compared"),
+        Entry("points_side", ("points",), "1", "−1, +1: flank of the crack", "int8"),
+        Entry("path_m", ("k", 2), "m", "crack path that the simulations are held to"),
+        Entry("measured/displacement_m", ("stations", "points", 2), "m", "measured displacement", optional=True),
+        Entry("measured/displacement_std_m", ("stations", "points"), "m", "its noise, of one component", optional=True),
+        Entry("measured/load_n", ("stations",), "N", "measured load", optional=True),
+        Entry("measured/load_std_n", ("stations",), "N", "its noise", optional=True),
+        Entry("compared", ("numbers",), "1", "which numbers are judged: displacements by station, point, component, "
+              "then loads", "bool"),
+        Entry("covariance", ("judged", "judged"), "m², m N, N²", "noise, discrepancy and scatter of what is judged"),
+        Entry("noise_variance", ("judged",), "m², N²", "of it, the noise"),
+        Entry("explanations", ("e",), "1", "none, then the most probable ones", "str"),
+        Entry("simulated/parameters", ("e", 2), "N, m", "f_max and delta_max at their best points"),
+        Entry("simulated/displacement_m", ("e", "stations", "points", 2), "m", "as the camera would read it"),
+        Entry("simulated/load_n", ("e", "stations"), "N", "as the load cell would read it"),
+        Entry("curve/cmod_m", ("rows",), "m", "of whole curves, as the gauge reads it"),
+        Entry("curve/load_n", ("e", "rows"), "N", "load as the load cell would read it"),
+        Entry("modes/names", ("modes",), "1", "of the amplitudes", "str"),
+        Entry("modes/amplitude_m", ("e", "modes", "stations"), "m", "of measured minus simulated", optional=True),
+        Entry("modes/noise_std_m", ("modes", "stations"), "m", "by noise alone", optional=True),
+        Entry("modes/std_m", ("modes", "stations"), "m", "by noise, discrepancy and scatter", optional=True),
+        Entry("grid/f_max_n", ("i",), "N", "grid lines of f_max"),
+        Entry("grid/delta_max_m", ("j",), "m", "grid lines of delta_max"),
+    ),
+)  # fmt: skip
+
 DIC_FRAME = Layout(
     "frames/*.h5 of dic",
     (

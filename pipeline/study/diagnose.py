@@ -18,11 +18,13 @@ from pipeline.gap.diagnosis import diagnose as judge
 from pipeline.gap.library import nearest, shipped
 from pipeline.gap.response import Abscissae, Response
 from pipeline.store.bundle import Bundle, read_bundle
+from pipeline.store.layouts import DIAGNOSE
 from pipeline.store.problem_key import problem_key
-from pipeline.store.results import prepare_output, write_result
+from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import Model, build_model, settings_of
+from pipeline.study.diagnose_arrays import diagnosis_arrays
 from pipeline.study.diagnose_result import diagnosis_result, sentence
 from pipeline.study.diagnose_sight import HALF, SPACINGS, Seen, beside, own_path, seen
 from pipeline.study.dic import FOLDER as DIC_FOLDER
@@ -164,6 +166,7 @@ def diagnose(
     look = replace(look, observation=beside(look.observation, band.path))
     result, diagnosis = judged(read, model, look, replace(simulator, band=band), settings.seed, without, grid)
     result |= {"seconds": time.monotonic() - started, "engine": engine or ENGINE}
+    write_arrays(folder, DIAGNOSE, diagnosis_arrays(diagnosis, band.path))
     write_result(folder, result)
     from pipeline.study.diagnose_page import diagnosis_page
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.core.units import MM
-from pipeline.gap.closure import Closure, Distance
+from pipeline.gap.closure import Closure, Distance, Share
 from pipeline.gap.diagnosis import Diagnosis
 from pipeline.gap.effects import effect, library
 from pipeline.gap.fit import Fitted
@@ -22,11 +22,12 @@ def diagnosis_result(
     bundle: Bundle, look: Seen, diagnosis: Diagnosis, warnings: list[str], radius: float
 ) -> dict[str, Any]:
     """What result.json holds, but for the time taken and the engine."""
-    d = diagnosis
+    d, area = diagnosis, bond_area(bundle)
     return {
         "version": __version__,
         "command": "diagnose",
         "bundle": bundle.name,
+        "bond_area_mm2": area / MM**2,
         "geometry": bundle.specimen.geometry,
         "radius_mm": radius / MM,
         "verdict": d.verdict.kind,
@@ -51,9 +52,10 @@ def diagnosis_result(
         },
         "gate": {m: {"chi_square_per_dof": d.gate.ratio[m], "limit": d.gate.limit[m]} for m in d.gate.ratio},
         "not_tested": dict(d.untested),
-        "parameters_before": _parameters(d.fits[NONE]),
-        "parameters_after": _parameters(d.best),
-        "bias_removed": _bias(d),
+        "parameters_before": parameters(d.fits[NONE], d.scored.temperature, area),
+        "parameters_after": parameters(d.best, d.scored.temperature, area),
+        "bias_removed": bias(d.fits[NONE].parameters, d.best.parameters),
+        "noise_bic": dict(d.noise_bic),
         "separate_by": separate_by(d),
         "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
         "warnings": warnings + ([_edge()] if d.fits[NONE].at_edge else []),
@@ -99,13 +101,23 @@ def separate_by(d: Diagnosis) -> list[str]:
 def closure_result(c: Closure) -> dict[str, Any]:
     """One closure by its keys."""
     return {
-        "fraction": _finite(c.fraction),
-        "interval_95": None if c.nothing else list(c.interval),
-        "nothing_to_close": c.nothing,
+        **share_result(c.whole),
+        "channels": {channel: share_result(share) for channel, share in c.channels.items()},
         "before": _distance(c.before),
         "after": _distance(c.after),
-        "floor": c.floor,
         "held_out": {name: {"before": _distance(one), "after": _distance(two)} for name, (one, two) in c.folds.items()},
+    }
+
+
+def share_result(share: Share) -> dict[str, Any]:
+    """What is closed of all data or of a channel; distances in standard deviations of noise and discrepancy."""
+    return {
+        "fraction": _finite(share.fraction),
+        "interval_95": None if share.nothing else list(share.interval),
+        "nothing_to_close": share.nothing,
+        "scaled_before": share.before,
+        "scaled_after": share.after,
+        "floor": share.floor,
     }
 
 
@@ -113,14 +125,28 @@ def _distance(d: Distance) -> dict[str, float | None]:
     return {"displacement_um": _finite(d.displacement_um), "load_n": _finite(d.load_n), "scaled": _finite(d.scaled)}
 
 
-def _parameters(fitted: Fitted) -> dict[str, float]:
-    return {"f_max_n": float(fitted.parameters[0]), "delta_max_m": float(fitted.parameters[1])}
+def bond_area(bundle: Bundle) -> float:
+    """2 r t (m²) of the bundle's lattice: f_max over it is a traction."""
+    return 2 * bundle.model.radius * bundle.specimen.thickness
 
 
-def _bias(d: Diagnosis) -> dict[str, float]:
-    """By how much the best explanation moves the parameters, relative."""
-    change = d.fits[NONE].parameters / d.best.parameters - 1
-    return {"f_max": float(change[0]), "delta_max": float(change[1])}
+def parameters(fitted: Fitted, temperature: float, area: float) -> dict[str, Any]:
+    """The two parameters and the energy of a bond over its area (m²), with intervals of the parameters."""
+    f_max, delta_max = (float(x) for x in fitted.parameters)
+    f_interval, delta_interval = fitted.parameter_interval(temperature=temperature).tolist()
+    return {
+        "f_max_n": f_max,
+        "delta_max_m": delta_max,
+        "bond_fracture_energy_j_per_m2": f_max * delta_max / area,
+        "interval_95": {"f_max_n": f_interval, "delta_max_m": delta_interval},
+    }
+
+
+def bias(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
+    """By how much f_max, δ_max and their product lie off without the explanation, relative to with it."""
+    f_max, delta_max = (float(x) for x in before / after - 1)
+    product = float(np.prod(before / after) - 1)
+    return {"f_max": f_max, "delta_max": delta_max, "bond_fracture_energy": product}
 
 
 def sentence(d: Diagnosis) -> str:

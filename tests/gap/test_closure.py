@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.closure import closure, folds, held_out
+from pipeline.gap.closure import DRAWS, closure, folds, held_out, left_by_complete
 from pipeline.gap.effect import Magnitude
 from pipeline.gap.fit import Data
 from pipeline.gap.metric import Metric
@@ -45,15 +45,41 @@ def closed(value: float, wrong: bool = False):
     start = np.zeros(2)
     other = none if wrong else right
     parts = [held_out(c, data, within + across, start) for c in (none, other)]
-    return closure(test, data, *parts, np.random.default_rng(1))
+    complete = left_by_complete(none, data, within, start, np.random.default_rng(2))
+    return closure(test, data, *parts, complete, np.random.default_rng(1))
+
+
+def test_a_complete_model_leaves_what_linear_least_squares_say():
+    """Held-out residuals of a linear model: Cov = Σ_hh + J C Jᵀ − both products of J with Cov(λ, held)."""
+    test, data, none, _ = scene(0.0)
+    [fold, *_], _ = folds(test)
+    found = left_by_complete(none, data, [fold], np.zeros(2), np.random.default_rng(0))[0][fold.held]
+    slopes = np.column_stack([none.predict(row, np.zeros(0)) for row in np.eye(2)])
+    rest, size = ~fold.held, data.metric.covariance
+    inverse = np.linalg.inv(size[np.ix_(rest, rest)])
+    normal = slopes[rest].T @ inverse @ slopes[rest] + 12 * np.eye(2) / 40**2  # and the box of width 40
+    gain = slopes[fold.held] @ np.linalg.solve(normal, slopes[rest].T @ inverse)
+    whole = np.hstack([np.eye(fold.held.sum()), -gain])
+    order = np.concatenate([np.flatnonzero(fold.held), np.flatnonzero(rest)])
+    exact = np.sqrt(np.diag(whole @ size[np.ix_(order, order)] @ whole.T))
+    # four standard errors of a standard deviation from so many draws
+    assert np.allclose(found.std(axis=1) / exact, 1.0, atol=4 / np.sqrt(2 * DRAWS))
 
 
 def test_the_true_effect_closes_all_of_the_gap():
     found = closed(40.0)
     assert not found.nothing
     assert found.fraction == pytest.approx(1.0, abs=0.1)  # the floor is an average over draws
-    assert found.interval[0] > 0.8
+    assert found.whole.interval[0] > 0.8
     assert found.after.displacement_um < 0.1 * found.before.displacement_um
+
+
+def test_every_channel_has_its_own_share():
+    """The opening shows in the field alone: there it closes the gap, in the load there is none."""
+    found = closed(40.0)
+    assert found.channels["field"].fraction == pytest.approx(1.0, abs=0.1)  # the floor is an average over draws
+    assert found.channels["load"].nothing
+    assert found.channels["field"].before > found.whole.before > found.channels["load"].before
 
 
 def test_an_effect_that_does_nothing_closes_nothing():

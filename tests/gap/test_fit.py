@@ -9,6 +9,8 @@ from pipeline.gap.candidate import Candidate
 from pipeline.gap.effect import Magnitude
 from pipeline.gap.fit import Data, fit
 from pipeline.gap.metric import Metric
+from pipeline.gap.noise import noise_bic
+from pipeline.gap.observation import Observation, Reading, Sight
 from tests.gap.linear import BOX, WIDE, candidate, covariance, data, exact_log_bayes, none
 
 
@@ -52,6 +54,18 @@ def test_temper_widens_the_interval_by_its_root():
     assert found.values(2.5)[0] == pytest.approx(found.values()[0], abs=1e-3 * (high - low))
 
 
+def test_the_interval_of_parameters_is_the_exact_one():
+    base, column, sigma, target = scene(3, 2.0)
+    found = fit(candidate(base, "x", column), data(target, sigma))
+    design, inverse = np.column_stack([base, column]), np.linalg.inv(sigma)
+    std = np.sqrt(np.diag(np.linalg.inv(design.T @ inverse @ design + np.diag([0, 0, 1 / WIDE.scale**2]))))[:2]
+    low, high = found.parameter_interval().T
+    assert np.allclose((high - low) / 2, 1.959964 * std, rtol=1e-5)  # central differences of a linear function
+    wide = found.parameter_interval(temperature=4.0)
+    assert np.allclose(wide.mean(axis=1), found.parameters)
+    assert (np.ptp(wide, axis=1) > high - low).all()
+
+
 def test_two_effects_at_once_have_the_exact_evidence():
     base, column, sigma, target = scene(5, 1.0)
     other = np.random.default_rng(9).normal(size=column.size)
@@ -88,6 +102,25 @@ def test_a_curved_effect_is_found_from_the_far_side():
     target = bent.predict(np.array([0.5, -1.0]), np.array([2.0])) + 0.05 * rng.normal(size=t.size)
     found = fit(bent, Data(target, Metric(0.05**2 * np.eye(t.size)), BOX))
     assert found.amplitudes[0] == pytest.approx(2.0, abs=0.05)  # ten times its standard deviation
+
+
+def test_against_noise_alone_the_criterion_is_that_of_least_squares():
+    """χ² + k ln n of linear least squares, whatever the discrepancy was said to be."""
+    rng = np.random.default_rng(0)
+    n, base, column = 40, rng.normal(size=(40, 2)), rng.normal(size=40)
+    reading = Reading(np.full((n, 1, 2), np.nan), base @ [1.0, -2.0] + column + 0.5 * rng.normal(size=n))
+    seen = Sight(
+        cmod=np.arange(1.0, n + 1), time=np.arange(1.0, n + 1), points=np.zeros((1, 2)), side=np.ones(1),
+        tip=np.zeros(2), peak_cmod=1.0, centre=np.zeros(2), corner=1.0, pull=np.zeros(2), end_cmod=1.0,
+    )  # fmt: skip
+    test = Observation(seen, reading, np.full((n, 1), np.nan), np.full(n, 0.5))
+    given = data(reading.load, covariance(n, rng))
+    fits = {c.label: fit(c, given) for c in (none(base), candidate(base, "x", column, Magnitude(-50, 50, 1e6, "1")))}
+    found = noise_bic(test, given, fits)
+    for label, design in (("none", base), ("x", np.column_stack([base, column]))):
+        left = reading.load - design @ np.linalg.lstsq(design, reading.load, rcond=None)[0]
+        assert found[label] == pytest.approx(4 * left @ left + design.shape[1] * np.log(n), rel=1e-6)  # one linear step
+    assert found["x"] < found["none"]
 
 
 def test_the_order_of_data_does_not_matter():
