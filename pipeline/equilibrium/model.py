@@ -12,6 +12,7 @@ from pipeline.equilibrium.constraints import Constraints
 from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
 from pipeline.materials.cohesive import central_law
 from pipeline.materials.memory import Memory, at_rest
+from pipeline.materials.mixed_softening import MixedSoftening
 
 
 class Model(Protocol):
@@ -57,9 +58,8 @@ def whole_model(problem: Problem) -> WholeModel:
     weight = np.zeros(constraints.drive.size)
     np.add.at(weight, constraints.per * problem.gauge.index, problem.gauge.weight)
     drive = float(weight @ constraints.drive)
-    return WholeModel(
-        central_law(problem.law, "equilibrium"), network, constraints, constraints.expand.T @ weight, drive
-    )
+    law = problem.law if isinstance(problem.law, MixedSoftening) else central_law(problem.law, "equilibrium")
+    return WholeModel(law, network, constraints, constraints.expand.T @ weight, drive)
 
 
 @dataclass(frozen=True)

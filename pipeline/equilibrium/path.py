@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.core.errors import ConvergenceError
 from pipeline.equilibrium.model import ElasticResponse, State, moved_at_once, rest
 from pipeline.equilibrium.step import Stepper
+from pipeline.materials.memory import at_rest
 
 HALVINGS = 4  # of an increment in which load or energy leap, before that is taken for a jump
 
@@ -73,7 +74,7 @@ class Path:
     def begin(self, elastic: ElasticResponse) -> tuple[State, State]:
         """Rest, and the state at which the first bond starts to soften or a first elastic increment ends."""
         model = self.stepper.model
-        usage = float(np.max(elastic.deformation / model.law.delta_peak, initial=0.0))
+        usage = float(np.max(at_rest(model.law).trial(0.0).usage(elastic.deformation), initial=0.0))
         self._stiff = 1 / elastic.cmod
         machine = 4 * self.increments.far * self.last / elastic.cmod
         return rest(model), moved_at_once(model, elastic, min(machine, 1 / usage) if usage > 0 else machine)

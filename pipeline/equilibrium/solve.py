@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.core.errors import ConvergenceError, InputError
-from pipeline.core.problem import Problem, Solution
+from pipeline.core.problem import Problem, SlidingLaw, Solution
 from pipeline.equilibrium import active
 from pipeline.equilibrium.condensation import CondensedModel, condense
 from pipeline.equilibrium.model import State, WholeModel, whole_model
@@ -176,6 +176,8 @@ def _refuse(problem: Problem, tolerance: float) -> None:
 
 
 def _reference_force(problem: Problem, opening: np.ndarray) -> float:
-    """The smallest f_max; without any, the largest force of the first elastic increment."""
-    finite = problem.law.f_max[np.isfinite(problem.law.f_max)]
+    """The smallest strength; without any, the largest tension of the first elastic increment."""
+    law = problem.law
+    strength = np.append(law.f_max, law.f_shear) if isinstance(law, SlidingLaw) else law.f_max
+    finite = strength[np.isfinite(strength) & np.isfinite(np.resize(law.f_max, strength.size))]
     return float(finite.min()) if finite.size else float(np.abs(problem.law.k_n * opening).max())

@@ -110,8 +110,15 @@ class MixedMemory:
         return MixedTrial(self.law, self.state)
 
     def settled(self, deformation: np.ndarray, duration: float) -> MixedMemory:
+        """Friction is booked by the mean of the shear before and after: steps are long here, and bonds open in them."""
         opening, sliding = np.split(deformation, 2)
-        return self.follow(opening, sliding, duration)
+        after = self.follow(opening, sliding, duration)
+        rubbed = self.state.progress >= self.law.last
+        if not self.law.friction or not rubbed.any():
+            return after
+        slip = after.state.plastic[:, 1] - self.state.plastic[:, 1]
+        used = np.where(rubbed, self.used + 0.5 * (self.shear + after.shear) * slip, after.used)
+        return replace(after, state=replace(after.state, used=used))
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,10 @@ class MixedState:
     plastic: np.ndarray
     used: np.ndarray
 
+    def of(self, bonds: np.ndarray) -> MixedState:
+        """The state of some of the bonds: numbers (k,) or bools (m,)."""
+        return MixedState(self.progress[bonds], self.plastic[bonds], self.used[bonds])
+
 
 @dataclass(frozen=True)
 class Mode:

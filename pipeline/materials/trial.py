@@ -22,7 +22,8 @@ class Trial(Protocol):
 
     `elastic`: stiffness, N/m, of undamaged bonds in this step. `force`: N, tension positive. `secant`: a stiffness,
     N/m, zero or positive, force over deformation unless the bond unloads elastically. `softening`: which bonds are on
-    their softening branch, where the tangent is negative.
+    their softening branch, where the tangent is negative. `usage` (m,): share of its strength that an undamaged bond
+    has used.
     """
 
     @property
@@ -30,6 +31,7 @@ class Trial(Protocol):
     def force(self, deformation: np.ndarray) -> np.ndarray: ...
     def secant(self, deformation: np.ndarray) -> np.ndarray: ...
     def softening(self, deformation: np.ndarray) -> np.ndarray: ...
+    def usage(self, deformation: np.ndarray) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -57,10 +59,16 @@ class CentralTrial:
     def softening(self, deformation: np.ndarray) -> np.ndarray:
         return (deformation > self.law.delta_peak) & (deformation >= self.reached)
 
+    def usage(self, deformation: np.ndarray) -> np.ndarray:
+        return deformation / self.law.delta_peak
+
 
 @dataclass(frozen=True)
 class MixedTrial:
-    """Bonds that open and slide; `state` before the step."""
+    """Bonds that open and slide; `state` before the step.
+
+    Friction slides within the step (return mapping); the place from which it counts is that before the step.
+    """
 
     law: MixedSoftening
     state: MixedState
@@ -70,18 +78,52 @@ class MixedTrial:
         return np.append(self.law.k_n, self.law.k_s)
 
     def force(self, deformation: np.ndarray) -> np.ndarray:
-        opening, sliding = np.split(deformation, 2)
-        return np.concatenate(self.law.forces(self.law.advance(self.state, opening, sliding), opening, sliding))
+        force = self.elastic * deformation
+        some, law, after = self._damaged(deformation)
+        normal, shear = law.forces(after, *self._at(deformation, some))
+        force[some], force[some + self.law.k_n.size] = normal, shear
+        return force
 
     def secant(self, deformation: np.ndarray) -> np.ndarray:
-        some = deformation != 0
-        secant = np.where(some, self.force(deformation) / np.where(some, deformation, 1.0), self.elastic)
-        return np.clip(secant, 0.0, self.elastic)
+        """K where a bond unloads elastically or sticks; nothing where it rubs."""
+        secant = self.elastic
+        some, law, after = self._damaged(deformation)
+        at, before = self._at(deformation, some), self.state.of(some)
+        grows, failed = after.progress > before.progress, after.progress >= law.last
+        for k, forces in enumerate(law.forces(after, *at)):
+            stiffness, moved = (law.k_n, law.k_s)[k], at[k] != 0
+            with np.errstate(over="ignore"):  # of what has hardly moved; limited all the same
+                over = np.where(moved, forces / np.where(moved, at[k], 1.0), stiffness)
+            over = np.clip(over, 0.0, stiffness)
+            if law.unloading is Unloading.ELASTIC:
+                over = np.where(grows | failed, over, stiffness)
+            secant[some + k * self.law.k_n.size] = over
+        rests = failed & (at[0] < 0) & (self.law.friction > 0)
+        sticks = rests & (after.plastic[:, 1] == before.plastic[:, 1])
+        across = some + self.law.k_n.size
+        secant[across] = np.where(rests, np.where(sticks, law.k_s, 0.0), secant[across])
+        return secant
 
     def softening(self, deformation: np.ndarray) -> np.ndarray:
+        some, _, after = self._damaged(deformation)
+        grows = np.zeros(self.law.k_n.size, bool)
+        grows[some] = after.progress > self.state.progress[some]
+        return np.append(grows & (deformation[: grows.size] > 0), grows)
+
+    def usage(self, deformation: np.ndarray) -> np.ndarray:
         opening, sliding = np.split(deformation, 2)
-        grows = self.law.advance(self.state, opening, sliding).progress > self.state.progress
-        return np.append(grows & (opening > 0), grows)
+        law = self.law
+        return np.hypot(law.k_n * np.maximum(opening, 0.0) / law.f_max, law.k_s * sliding / law.f_shear)
+
+    def _damaged(self, deformation: np.ndarray) -> tuple[np.ndarray, MixedSoftening, MixedState]:
+        """Numbers (k,) of the bonds that are damaged or would be, few and costly, their law, and their state then."""
+        some = np.flatnonzero((self.state.progress > 0) | (self.usage(deformation) > 1))
+        law = self.law.of(some)
+        return some, law, law.advance(self.state.of(some), *self._at(deformation, some))
+
+    def _at(self, deformation: np.ndarray, bonds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Openings and slidings (k,), m, of some bonds."""
+        return deformation[bonds], deformation[bonds + self.law.k_n.size]
 
 
 class CreepingTrial:
@@ -114,3 +156,6 @@ class CreepingTrial:
     def softening(self, deformation: np.ndarray) -> np.ndarray:
         begins = ~self.state.softened & (deformation >= self.onset)
         return begins | (self.state.softened & (deformation > 0) & (deformation >= self.state.reached))
+
+    def usage(self, deformation: np.ndarray) -> np.ndarray:
+        return deformation / self.law.delta_peak
