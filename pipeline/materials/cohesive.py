@@ -11,6 +11,8 @@ from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import BondLaw
 from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
+Factor = np.ndarray | float
+
 
 @dataclass(frozen=True)
 class CentralSoftening:
@@ -57,6 +59,14 @@ class CentralSoftening:
     def scaled(self, factor: float) -> Self:
         """The law with strengths and openings multiplied: (s f_max, s δ_max) of every bond."""
         return replace(self, f_max=factor * self.f_max, delta_max=factor * self.delta_max)
+
+    def times(self, stiffness: Factor, strength: Factor, opening: Factor) -> Self:
+        """The law with stiffness, strength and last opening of every bond multiplied, each by a number or (m,)."""
+        return replace(self, k_n=stiffness * self.k_n, f_max=strength * self.f_max, delta_max=opening * self.delta_max)
+
+    def spared(self, bonds: np.ndarray) -> Self:
+        """The law with some bonds (m,) bool that take no damage."""
+        return replace(self, f_max=np.where(bonds, np.inf, self.f_max))
 
     @property
     def delta_end(self) -> np.ndarray:

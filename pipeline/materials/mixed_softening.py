@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.core.errors import InputError
-from pipeline.materials.cohesive import CentralSoftening, refuse_brittle, refuse_values
+from pipeline.materials.cohesive import CentralSoftening, Factor, refuse_brittle, refuse_values
 from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
 
@@ -119,6 +119,23 @@ class MixedSoftening:
         """The law of some of the bonds: numbers (k,) or bools (m,)."""
         names = ("k_n", "k_s", "f_max", "f_shear", "delta_max", "delta_shear")
         return replace(self, **{name: getattr(self, name)[bonds] for name in names})
+
+    def times(self, stiffness: Factor, strength: Factor, opening: Factor) -> MixedSoftening:
+        """The law with the stiffnesses, strengths and ends of every bond multiplied, each by a number or (m,)."""
+        return replace(
+            self,
+            k_n=stiffness * self.k_n,
+            k_s=stiffness * self.k_s,
+            f_max=strength * self.f_max,
+            f_shear=strength * self.f_shear,
+            delta_max=opening * self.delta_max,
+            delta_shear=opening * self.delta_shear,
+        )
+
+    def spared(self, bonds: np.ndarray) -> MixedSoftening:
+        """The law with some bonds (m,) bool that take no damage."""
+        f_max, f_shear = (np.where(bonds, np.inf, strength) for strength in (self.f_max, self.f_shear))
+        return replace(self, f_max=f_max, f_shear=f_shear)
 
     def at_rest(self) -> MixedState:
         """Bonds that were never loaded."""

@@ -113,7 +113,11 @@ class MixedTrial:
     def usage(self, deformation: np.ndarray) -> np.ndarray:
         opening, sliding = np.split(deformation, 2)
         law = self.law
-        return np.hypot(law.k_n * np.maximum(opening, 0.0) / law.f_max, law.k_s * sliding / law.f_shear)
+        return np.where(
+            np.isfinite(law.f_max),
+            np.hypot(law.k_n * np.maximum(opening, 0.0) / law.f_max, law.k_s * sliding / law.f_shear),
+            0.0,
+        )
 
     def _damaged(self, deformation: np.ndarray) -> tuple[np.ndarray, MixedSoftening, MixedState]:
         """Numbers (k,) of the bonds that are damaged or would be, few and costly, their law, and their state then."""

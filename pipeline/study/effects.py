@@ -16,6 +16,7 @@ from pipeline.gap.effect import PhysicsEffect
 from pipeline.gap.effects import checked, effect
 from pipeline.gap.plan import Place, Plan
 from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
+from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phases import lay_phases
@@ -108,17 +109,13 @@ def lattice_problem(model: Model, plan: Plan, problem: Problem, f_max: float, de
     if plan.specimen != model.bundle.specimen:
         particles, bonds, cut = _other_notch(model, plan.specimen)
     law = plan.mixture.law(bonds, plan.specimen.thickness, f_max * model.force_scale, delta_max)
-    if not isinstance(law, CentralSoftening):
-        raise UnavailableError("effects are simulated with bonds without shear (poissons_ratio at its limit) only")
     place = Place(particles.position[bonds.pairs].mean(axis=1), bonds.phase, plan.specimen)
     factors = plan.factors(place)
     soft = np.isin(bonds.phase, SOFT)
     solid = np.where(soft, 1 - plan.void_share, 1.0)
     stiffness = factors.stiffness * solid**3 * cut  # E ∝ (1 − φ)³: 1 − 3φ for few round voids (Day et al. 1992)
     strength = factors.strength * solid * cut  # what is left of a section
-    changed: CentralSoftening = replace(
-        law, k_n=stiffness * law.k_n, f_max=strength * law.f_max, delta_max=factors.opening * law.delta_max
-    )
+    changed = law.times(stiffness, strength, factors.opening)
     if plan.spent:
         changed = _spent(changed, plan, place.middle)
     grips = _grips(model, plan, particles)
@@ -128,9 +125,9 @@ def lattice_problem(model: Model, plan: Plan, problem: Problem, f_max: float, de
 def held_to(problem: Problem, band: Band) -> Problem:
     """The same test; bonds outside the band take no damage."""
     law = problem.law
-    assert isinstance(law, CentralSoftening)
+    assert isinstance(law, CentralSoftening | MixedSoftening)
     inside = band.holds(problem.particles.position[problem.bonds.pairs].mean(axis=1))
-    return problem.with_law(replace(law, f_max=np.where(inside, law.f_max, np.inf)))
+    return problem.with_law(law.spared(~inside))
 
 
 def _refuse(plan: Plan) -> None:
@@ -190,10 +187,13 @@ def _crossing(particles: Particles, bonds: Bonds) -> np.ndarray:
     return np.where(crosses, one[:, 1] - one[:, 0] / run * (two[:, 1] - one[:, 1]), np.nan)
 
 
-def _spent(law: CentralSoftening, plan: Plan, middle: np.ndarray) -> CentralSoftening:
+def _spent(law: CentralSoftening | MixedSoftening, plan: Plan, middle: np.ndarray) -> LinearSoftening:
     """Bonds near the tip with a part of their softening behind them: the rest of the straight branch is kept."""
     if not isinstance(law, LinearSoftening):
-        raise UnavailableError("damage at the tip is simulated with linear softening only")
+        raise UnavailableError(
+            "damage at the tip is simulated with linear softening only, and with bonds that carry no shear "
+            "(poissons_ratio at its limit)"
+        )
     near = np.hypot(*(middle - plan.specimen.tip).T) <= plan.spent_radius
     near &= np.isfinite(law.f_max)
     reached = law.delta_peak + plan.spent * (np.where(near, law.delta_max, 0.0) - np.where(near, law.delta_peak, 0.0))

@@ -17,7 +17,7 @@ from pipeline.store.bundle import read_bundle
 from pipeline.store.new import Contents, write_bundle
 from pipeline.study.assembly import Model, build_model
 from pipeline.study.effects import Band, held_to, lattice_problem, physics_effects, planned, settled
-from tests.helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment
+from tests.helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment, edit
 
 ELASTIC = 0.004 * MM  # of CMOD: nothing softens yet
 SIMULATED = [
@@ -140,6 +140,51 @@ def test_what_no_engine_can_do_is_refused(model, name):
 def test_shear_strength_is_refused_where_bonds_carry_no_shear(model):
     with pytest.raises(InputError, match="no effect"):
         changed(model, shear_strength_ratio=0.1)
+
+
+@pytest.fixture(scope="module")
+def sliding_model(tmp_path_factory) -> Model:
+    """The same beam at ν = 0.15, where bonds carry shear."""
+    folder = tmp_path_factory.mktemp("sliding") / "beam"
+    write_bundle(folder, coarse_experiment("beam"), Contents())
+    edit(folder, poissons_ratio="0.15")
+    return build_model(read_bundle(folder))
+
+
+@pytest.mark.parametrize("name", [n for n in SIMULATED if n != "tip_damage"] + ["shear_strength_ratio"])
+def test_an_effect_of_nothing_changes_nothing_where_bonds_carry_shear(sliding_model, name):
+    model = sliding_model
+    plan = effect(name).change(0.0, Plan(model.bundle.specimen, model.mixture))
+    problem = model.problem(F_MAX, DELTA_MAX, frames=np.array([ELASTIC]), cmod_max=ELASTIC)
+    found = lattice_problem(model, plan, problem, F_MAX, DELTA_MAX)
+    for name in ("k_n", "k_s", "f_max", "f_shear", "delta_max", "delta_shear"):
+        assert np.allclose(getattr(found.law, name), getattr(problem.law, name)), name
+
+
+def test_shear_strength_matters_where_bonds_carry_shear_once_they_soften(sliding_model):
+    weak, same = changed(sliding_model, shear_strength_ratio=-0.5).law, changed(sliding_model).law
+    assert np.allclose(weak.f_shear, 0.5 * same.f_shear)
+    assert np.array_equal(weak.f_max, same.f_max)
+    assert load(sliding_model, shear_strength_ratio=-0.5) == pytest.approx(load(sliding_model), rel=1e-6)  # elastic
+    late = 0.05 * MM
+    assert load(sliding_model, late, shear_strength_ratio=-0.5) < 0.99 * load(sliding_model, late)
+
+
+def test_modulus_scales_the_elastic_load_where_bonds_carry_shear(sliding_model):
+    exact = 1.2 * load(sliding_model)
+    assert load(sliding_model, modulus=0.2) == pytest.approx(exact, rel=1e-6)  # solver's tolerance
+
+
+def test_bonds_outside_the_band_neither_open_nor_slide(sliding_model):
+    found = held_to(changed(sliding_model), Band(np.array([[0, 15], [0, 40]]) * MM, 6 * MM)).law
+    assert np.array_equal(np.isinf(found.f_max), np.isinf(found.f_shear))
+    assert np.isinf(found.f_max).any()
+    assert np.isfinite(found.f_max).any()
+
+
+def test_damage_at_the_tip_is_refused_where_bonds_carry_shear(sliding_model):
+    with pytest.raises(UnavailableError, match="bonds that carry no shear"):
+        changed(sliding_model, tip_damage=0.3)
 
 
 def test_only_physics_is_simulated():
