@@ -24,6 +24,7 @@ from pipeline.store.fields import read_fields
 from pipeline.study import (
     cross_check,
     diagnose_result,
+    diagnose_together,
     dic,
     identify,
     model,
@@ -169,6 +170,10 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
         diagnose_result.diagnosis_result,
         diagnose_result.closure_result,
         diagnose_result.share_result,
+        diagnose_result.card_result,
+        diagnose_together.together_result,
+        diagnose_together.transfer_result,
+        diagnose_together._one,
         diagnose_result.parameters,
     ],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.special import ndtr
@@ -12,6 +12,8 @@ from scipy.special import ndtr
 from pipeline.core.errors import InputError
 from pipeline.gap.observation import Reading, Sight
 from pipeline.gap.plan import Plan
+
+Belongs = Literal["material", "set-up", "test"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class Effect(ABC):
     magnitude : Magnitude
     equivalents : what else, not in the library, does exactly the same
     remedy : what to measure to find out, or to do without it
+    belongs : to what: the material (as large in every test of it), the set-up (as large in every test made alike), or
+        this one test
     """
 
     name: ClassVar[str]
@@ -72,6 +76,7 @@ class Effect(ABC):
     magnitude: ClassVar[Magnitude]
     equivalents: ClassVar[tuple[str, ...]] = ()
     remedy: ClassVar[str]
+    belongs: ClassVar[Belongs]
     kind: ClassVar[str]
 
 
@@ -79,6 +84,7 @@ class MeasurementEffect(Effect):
     """Acts on what is read off a simulation; costs none."""
 
     kind = "measurement"
+    belongs: ClassVar[Belongs] = "set-up"
 
     def field_at(self, value: np.ndarray, sight: Sight, cmod: np.ndarray) -> np.ndarray:
         """True CMOD (s,), m, at which the fields of the stations were taken, when without it they were at `cmod`."""
@@ -97,6 +103,7 @@ class PhysicsEffect(Effect):
     """Acts on the plan of a test, before it is built and simulated."""
 
     kind = "physics"
+    belongs: ClassVar[Belongs] = "material"
 
     @abstractmethod
     def change(self, value: float, plan: Plan) -> Plan:

@@ -101,7 +101,7 @@ def card(candidates: Mapping[str, Candidate], data: Data, parameters: np.ndarray
     changes = [s.all(v) for s, v in zip(signals, at, strict=True)]
     remaining = np.array([[_remaining(c, s) for s in signals] for c in changes]) / root
     np.fill_diagonal(remaining, 0.0)
-    return Card(names, limit, d_prime, at, remaining, _classes(names, limit, remaining))
+    return Card(names, limit, d_prime, at, remaining, classes(names, limit, remaining))
 
 
 def _signal(candidate: Candidate, data: Data, parameters: np.ndarray) -> _Signal:
@@ -142,7 +142,7 @@ def _remaining(changes: list[np.ndarray], competitor: _Signal) -> float:
     return float(min(found))
 
 
-def _classes(names: tuple[str, ...], limit: np.ndarray, remaining: np.ndarray) -> tuple[tuple[str, ...], ...]:
+def classes(names: tuple[str, ...], limit: np.ndarray, remaining: np.ndarray) -> tuple[tuple[str, ...], ...]:
     """Detectable effects in groups of which no two are told apart (complete linkage: no chains)."""
     seen = np.flatnonzero(np.isfinite(limit))
     if seen.size < 2:

@@ -89,4 +89,4 @@ def pooled(replicates: Sequence[Mapping[str, float]]) -> dict[str, float]:
 def pairs(singles: Scored, best: int = 3) -> list[tuple[str, str]]:
     """The pairs of the most probable single effects."""
     top = [label for label in singles.ranked() if label != NONE][:best]
-    return [(a, b) for i, a in enumerate(top) for b in top[i + 1 :]]
+    return sorted((min(a, b), max(a, b)) for i, a in enumerate(top) for b in top[i + 1 :])

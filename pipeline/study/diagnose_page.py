@@ -6,130 +6,266 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pipeline.gap.diagnosis import Diagnosis
 from pipeline.gap.effects import effect
 from pipeline.gap.identifiability import DETECTED
-from pipeline.gap.observation import STAGES, Reading
+from pipeline.gap.observation import STAGES
 from pipeline.gap.score import NONE
-from pipeline.report.diagnosis import closures, detectability, differences, loads, ranking, where_map
+from pipeline.report.diagnosis import (
+    closures,
+    detectability,
+    difference_map,
+    differences,
+    loads,
+    ranking,
+    where_map,
+)
 from pipeline.report.page import Figure, Number, Section, page
 from pipeline.report.style import Draw, png
 from pipeline.store.atomic import write_atomically
-from pipeline.study.assembly import Model
-from pipeline.study.diagnose_sight import Seen
-from pipeline.study.effects import Band
+from pipeline.study.diagnose_arrays import reading_of, shown, whole_curve
+from pipeline.study.diagnose_case import Case
 from pipeline.study.pages import picture, write_page
 
-WIDE = {"width": 180.0, "height": 62.0}  # mm
+WIDE = {"width": 190.0, "height": 66.0}  # mm
+CALLED = {NONE: "model as it is"}
+CELLS = 4  # of the table of where, in words
 
 
-def diagnosis_page(
-    folder: Path, model: Model, look: Seen, diagnosis: Diagnosis, result: Mapping[str, Any], band: Band
-) -> None:
+def diagnosis_page(case: Case, diagnosis: Diagnosis, result: Mapping[str, Any]) -> None:
     """Figures and report.html of a diagnosis."""
+    folder = case.folder
     sections = [
-        Section("The verdict", text=_told(result), numbers=_numbers(result), notes=look.remarks),
-        _where(folder, result),
+        verdict_section(result, case.look.remarks),
+        _where(folder, diagnosis, result),
         _which(folder, diagnosis, result),
-        _how_far(folder, diagnosis, result),
-        _unseen(folder, result),
-        Section("What to measure next", notes=result["separate_by"]),
+        _how_far(case, diagnosis, result),
+        unseen_section(folder, result),
+        next_section(result),
     ]
-    footer = [f"cohesive-bpm {result['version']}", f"{result['simulations']} simulations", f"{result['seconds']:.0f} s"]
-    text = page(model.bundle.name, sections, subtitle="sim-to-real gap", warnings=result["warnings"], footer=footer)
+    text = page(
+        case.bundle.name, sections, subtitle="sim-to-real gap", warnings=result["warnings"], footer=footer(result)
+    )
     write_page(folder, text)
 
 
-def _told(result: Mapping[str, Any]) -> str:
+def footer(result: Mapping[str, Any]) -> list[str]:
+    return [
+        f"cohesive-bpm {result['version']}",
+        f"engine {result['engine']}",
+        f"{result['simulations']} simulations",
+        f"{result['seconds']:.0f} s, of these {result['seconds_simulating']:.0f} s simulating",
+    ]
+
+
+def verdict_section(result: Mapping[str, Any], remarks: Any) -> Section:
+    """What is said, how large it is, what it does to the parameters."""
     named = "; ".join(f"{n}: {effect(n).says}" for n in result["named"])
-    return f"{result['verdict']}. {named + '. ' if named else ''}{result['reason']}."
+    told = f"{result['verdict'].capitalize()}. {named + '. ' if named else ''}{result['reason'].capitalize()}."
+    first = next((label for label in result["closure"] if set(label.split(" + ")) <= set(result["named"])), None)
+    if first is not None:
+        told += f" {closed(first, result['closure'][first])}."
+    return Section("The verdict", text=told, numbers=[*_sizes(result), *_parameters(result)], notes=list(remarks))
 
 
-def _numbers(result: Mapping[str, Any]) -> list[Number]:
+def _sizes(result: Mapping[str, Any]) -> list[Number]:
     rows = []
     for name in result["named"]:
         found = result["estimate"][name]
-        low, high = found["interval_95"]
+        low, high = (amount(v, found["unit"]) for v in found["interval_95"])
         rows.append(
-            Number(
-                name, f"{found['value']:.3g} {found['unit']}", f"95 %: {low:.3g} to {high:.3g}, if it is the only one"
-            )
+            Number(name, amount(found["value"], found["unit"]), f"95 %: {low} to {high}, if it is the only one")
         )
-    before, after = result["parameters_before"], result["parameters_after"]
-    rows += [
-        Number("f_max", f"{after['f_max_n']:.4g} N", f"{before['f_max_n']:.4g} N without the explanation"),
-        Number("delta_max", f"{after['delta_max_m']:.4g} m", f"{before['delta_max_m']:.4g} m without the explanation"),
-    ]
     return rows
 
 
-def _where(folder: Path, result: Mapping[str, Any]) -> Section:
+def amount(value: float | None, unit: str) -> str:
+    """A size with its unit."""
+    return "–" if value is None else f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _parameters(result: Mapping[str, Any]) -> list[Number]:
+    before, after, bias = (result[k] for k in ("parameters_before", "parameters_after", "bias_removed"))
+    rows = []
+    for name, key, unit in (
+        ("f_max", "f_max_n", "N"),
+        ("delta_max", "delta_max_m", "m"),
+        ("f_max delta_max/(2 r t)", "bond_fracture_energy_j_per_m2", "J/m²"),
+    ):
+        interval = after.get("interval_95", {}).get(key)
+        spread = f" (95 %: {interval[0]:.4g} to {interval[1]:.4g})" if interval else ""
+        off = bias[key.removesuffix("_n").removesuffix("_m").removesuffix("_j_per_m2")]
+        told = f"{before[key]:.4g} {unit} without the first explanation: {off:+.0%} off{spread}"
+        rows.append(Number(name, f"{after[key]:.4g} {unit}", told))
+    return rows
+
+
+def closed(label: str, c: Mapping[str, Any]) -> str:
+    """How far an explanation closes the gap, in words."""
+    called = CALLED.get(label, label)
+    if c["nothing_to_close"]:
+        return f"{called}: nothing to close, the model as it is lies within what engines differ by"
+    low, high = c["interval_95"]
+    return f"{called} closes {c['fraction']:.0%} of the gap on data not used for it (95 %: {low:.0%} to {high:.0%})"
+
+
+def _where(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
     cells = result["where"]
-    top = cells[0] if cells else None
-    told = (
-        f"Most out of line: {top['channel']}, {top['stage']}, {top['region']}, {top['mode']}: {top['rms']:.3g} "
-        f"{top['unit']}, {top['z_gap']:.2g} times what complete models leave, {top['z_noise']:.2g} times noise."
-        if top
-        else ""
-    )
+    figures = where_figures(folder, cells)
+    if d.observation.has_field:
+        figures.insert(0, _arrows(folder, d))
+    return Section("Where test and simulation part", text=where_told(cells), figures=figures)
+
+
+def where_told(cells: list[dict[str, Any]]) -> str:
+    """The cells that stand out most, in words."""
+    told = [
+        f"{c['channel']}, {c['stage']}" + (f", {c['region']}, {c['mode']}" if c["channel"] == "field" else "")
+        + f": {c['rms']:.2g} {'N' if c['channel'] == 'load' else 'µm'}, {c['z_gap']:.2g} times what complete models "
+        f"leave, {c['z_noise']:.2g} times noise"
+        for c in cells[:CELLS]
+    ]  # fmt: skip
+    return "After the refit of f_max and delta_max, the model as it is leaves most in " + "; ".join(told) + "."
+
+
+def where_figures(folder: Path, cells: list[dict[str, Any]]) -> list[Figure]:
+    """Maps of region × mode by stage, against what engines differ by and against noise."""
     figures = []
-    if any(c["channel"] == "field" for c in cells):
-        for against, words in (("z_gap", "noise and engine discrepancy"), ("z_noise", "noise alone")):
-            panels = [_panel(cells, stage, against) for stage in STAGES]
-            data = png(*panels, columns=3, **WIDE)
-            write_atomically(folder / f"where_{against}.png", data)
-            figures.append(Figure(data, f"Difference of the model as it is, over what {words} would give.", wide=True))
-    return Section("Where", text=told, figures=figures)
+    for against, words in (("z_gap", "noise and engine discrepancy"), ("z_noise", "noise alone")):
+        panels = [_panel(cells, stage, against) for stage in STAGES]
+        data = png(*panels, columns=3, **WIDE)
+        write_atomically(folder / f"where_{against}.png", data)
+        told = f"Model as it is: difference, and how many times larger it is than {words} would give (1 is expected)."
+        figures.append(Figure(data, told, wide=True))
+    return figures
 
 
 def _panel(cells: list[dict[str, Any]], stage: str, against: str) -> Draw:
     return lambda axes: where_map(axes, cells, stage, against)
 
 
+def field_std(d: Diagnosis) -> np.ndarray:
+    """Standard deviation (s, p), m, of noise and discrepancy; NaN where nothing is judged."""
+    o = d.observation
+    whole = np.full(o.mask.size, np.nan)
+    whole[o.mask] = d.data.metric.std
+    return np.sqrt(np.mean(whole[: o.reading.field.size].reshape(o.reading.field.shape) ** 2, axis=2))
+
+
+def load_std(d: Diagnosis) -> np.ndarray:
+    """The same of the load (s,), N."""
+    whole = np.full(d.observation.mask.size, np.nan)
+    whole[d.observation.mask] = d.data.metric.std
+    return whole[d.observation.reading.field.size :]
+
+
+def _arrows(folder: Path, d: Diagnosis) -> Figure:
+    before, std = reading_of(d, d.fits[NONE]), field_std(d)
+    left = np.where(np.isfinite(std)[..., None], d.observation.reading.field - before.field, 0.0)
+    longest = max(float(np.nanmax(np.hypot(left[..., 0], left[..., 1]))), 1e-9)
+    panels: list[Draw] = [
+        lambda axes, k=k: difference_map(axes, d.observation, before, std, k, longest)  # type: ignore[misc]
+        for k in range(len(STAGES))
+    ]
+    data = png(*panels, columns=3, **WIDE)
+    write_atomically(folder / "where_points.png", data)
+    told = "Measured minus simulated displacement, model as it is; last station of every stage (triangle: notch tip)."
+    return Figure(data, told, wide=True)
+
+
 def _which(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
-    classes = [" = ".join(c) + ": not told apart by these data" for c in result["equivalence_classes"]]
-    alike = [f"{n} does exactly what {' or '.join(e)} would do" for n, e in result["equivalents"].items()
-             if n in result["set_90"]]  # fmt: skip
     figure = picture(folder, "ranking", lambda a: ranking(a, d.scored.probability), "Probability of each explanation.")
-    return Section("Which effect", figures=[figure], notes=[*classes, *alike])
+    return Section("Which effect", numbers=likely(result), figures=[figure], notes=alike(result))
 
 
-def _how_far(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
-    none, best = d.fits[NONE], d.best
-    before = d.emulator.reading(none.parameters)
-    after: Reading = d.emulator.reading(best.parameters, best.candidate.names, best.amplitudes)
+def likely(result: Mapping[str, Any]) -> list[Number]:
+    """The explanations that hold 90 % of the probability, with their sizes."""
+    rows = []
+    for label in result["set_90"]:
+        sizes = []
+        for name in label.split(" + ") if label != NONE else ():
+            found = result["estimate"][name]
+            sizes.append(f"{effect(name).says} ({amount(found['value'], found['unit'])} if it is the only one)")
+        rows.append(Number(CALLED.get(label, label), f"{result['probability'][label]:.2f}", "; ".join(sizes)))
+    return rows
+
+
+def alike(result: Mapping[str, Any]) -> list[str]:
+    """What these data do not tell apart, or nobody could."""
+    classes = [" = ".join(c) + ": not told apart by these data" for c in result["equivalence_classes"]]
+    likely_ = {n for label in result["set_90"] for n in label.split(" + ")}
+    same = [
+        f"{n} does exactly what {' or '.join(e)} would do" for n, e in result["equivalents"].items() if n in likely_
+    ]
+    return [*classes, *same]
+
+
+def _how_far(case: Case, d: Diagnosis, result: Mapping[str, Any]) -> Section:
+    fitted = shown(d)[:3]
+    names = [CALLED.get(f.candidate.label, f"with {f.candidate.label}") for f in fitted]
     figures = []
-    label = best.candidate.label
     if d.observation.has_load:
-        figures.append(picture(folder, "curve", lambda a: loads(a, d.observation, before, after, label), "Load."))
+        curves = {n: whole_curve(d, f) for n, f in zip(names, fitted, strict=True)}
+        curve = case.bundle.curve
+        record = None if curve is None else (curve.cmod, curve.load)
+        figures.append(
+            picture(
+                case.folder, "curve", lambda a: loads(a, d.observation, curves, record, load_std(d)),
+                "Load before and after; the runner-up beside it.",
+            )
+        )  # fmt: skip
     if d.observation.has_field:
-        told = "Displacements: difference at every station."
-        figures.append(picture(folder, "difference", lambda a: differences(a, d.observation, before, after), told))
+        readings = {n: reading_of(d, f) for n, f in zip(names, fitted, strict=True)}
+        told = "Displacements: root mean square difference at every station, before and after."
+        figures.append(
+            picture(case.folder, "difference", lambda a: differences(a, d.observation, readings, field_std(d)), told)
+        )
     if any(c["fraction"] is not None for c in result["closure"].values()):
         told = "Share of the gap closed on data that were not used, first explanation and runners-up."
-        figures.append(picture(folder, "closure", lambda a: closures(a, result["closure"]), told))
-    notes = [_closed(label, c) for label, c in result["closure"].items()]
-    notes.append("A wrong effect can close a gap as well as the right one: only transfer to other tests decides.")
-    return Section("How far it closes", figures=figures, notes=notes)
+        figures.append(picture(case.folder, "closure", lambda a: closures(a, result["closure"]), told))
+    notes = ["A wrong effect can close a gap as well as the right one: only transfer to other tests decides."]
+    numbers = [closure_row(label, c) for label, c in result["closure"].items()]
+    return Section("How far the gap closes", numbers=numbers, figures=figures, notes=notes)
 
 
-def _closed(label: str, c: Mapping[str, Any]) -> str:
-    if c["nothing_to_close"]:
-        return f"{label}: nothing to close, the model as it is lies within what engines differ by"
-    low, high = c["interval_95"]
-    return f"{label}: {c['fraction']:.0%} of the gap on held-out data (95 %: {low:.0%} to {high:.0%})"
+def closure_row(label: str, c: Mapping[str, Any]) -> Number:
+    """Closure of one explanation on held-out data, channel by channel, in µm and N."""
+    value = "nothing to close" if c["nothing_to_close"] else f"{c['fraction']:.0%}"
+    parts = []
+    for channel, key, unit in (("field", "displacement_um", "µm"), ("load", "load_n", "N")):
+        before, after = c["before"][key], c["after"][key]
+        if before is None:
+            continue
+        share = c.get("channels", {}).get(channel)
+        closed_ = "" if share is None else (" (nothing to close)" if share["fraction"] is None else
+                                            f" ({share['fraction']:.0%})")  # fmt: skip
+        parts.append(f"{channel} {before:.3g} → {after:.3g} {unit}{closed_}")
+    interval = "" if c["nothing_to_close"] else "95 %: {:.0%} to {:.0%}; ".format(*c["interval_95"])
+    return Number(label, value, interval + "; ".join(parts))
 
 
-def _unseen(folder: Path, result: Mapping[str, Any]) -> Section:
-    figure = picture(
-        folder, "detectability", lambda a: detectability(a, result["detection_limit"], DETECTED), "What could be seen."
-    )
-    rows = [
-        Number(
-            n, f"{row['value']:.3g} {row['unit']}" if row["value"] is not None else "not detectable", "detection limit"
-        )
-        for n, row in result["detection_limit"].items()
-    ]
-    notes = ["cannot be excluded: " + ", ".join(result["cannot_exclude"])]
+def unseen_section(folder: Path, result: Mapping[str, Any]) -> Section:
+    """Detection limits, and what stays possible whatever was found."""
+    limits = result["detection_limit"]
+    figure = picture(folder, "detectability", lambda a: detectability(a, limits, DETECTED), "What could be seen.")
+    rows = []
+    for name, row in sorted(limits.items(), key=lambda item: -item[1]["d_prime_at_most"]):
+        size = effect(name).magnitude
+        plausible = f"plausible: {size.low:g} to {amount(size.high, size.unit)}"
+        value = "not seen" if row["value"] is None else f"from {amount(row['value'], row['unit'])}"
+        rows.append(Number(name, value, f"{effect(name).says}; {plausible}"))
+    hidden = ", ".join(result["cannot_exclude"])
+    notes = [f"cannot be excluded: {hidden}" if hidden else "every effect of the library would have been seen"]
     notes += [f"not tested: {n} ({reason})" for n, reason in result["not_tested"].items()]
     return Section("What these data can and cannot show", numbers=rows, figures=[figure], notes=notes)
+
+
+def next_section(result: Mapping[str, Any]) -> Section:
+    """What to measure: first what tells the likely explanations apart, then what cannot be seen."""
+    likely_ = {n for label in result["set_90"] for n in label.split(" + ")} | set(result["named"])
+    first = [s for s in result["separate_by"] if s.split(":")[0] in likely_]
+    rest = [s for s in result["separate_by"] if s not in first]
+    told = "" if not first else "To confirm or to tell apart: " + "; ".join(first) + "."
+    return Section("What to measure next", text=told, notes=[f"to see what these data hide – {s}" for s in rest])

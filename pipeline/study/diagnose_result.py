@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from pipeline.gap.closure import Closure, Distance, Share
 from pipeline.gap.diagnosis import Diagnosis
 from pipeline.gap.effects import effect, library
 from pipeline.gap.fit import Fitted
-from pipeline.gap.identifiability import DETECTED
-from pipeline.gap.score import NONE
+from pipeline.gap.gate import Gate
+from pipeline.gap.identifiability import DETECTED, Card
+from pipeline.gap.score import NONE, Scored
+from pipeline.gap.verdict import CAUSE, Verdict
 from pipeline.store.bundle import Bundle
 from pipeline.study.diagnose_sight import Seen
 
@@ -38,25 +41,18 @@ def diagnosis_result(
         "temperature": d.scored.temperature,
         "set_90": d.scored.credible(),
         "equivalence_classes": [list(c) for c in d.card.classes],
-        "cannot_exclude": cannot_exclude(d),
+        "cannot_exclude": excluded_not(d.scored, d.card, d.verdict, d.untested),
         "estimate": {n: estimate(d, n) for n in _single(d)},
         "where": [vars(cell) for cell in d.cells],
         "closure": {label: closure_result(c) for label, c in d.closures.items()},
-        "detection_limit": {
-            n: {"value": _finite(limit), "unit": effect(n).magnitude.unit, "d_prime_at_most": float(at_most)}
-            for n, limit, at_most in zip(d.card.names, d.card.limit, d.card.d_prime, strict=True)
-        },
-        "remaining_d_prime": {
-            n: {"value": float(v), **dict(zip(d.card.names, row.tolist(), strict=True))}
-            for n, v, row in zip(d.card.names, d.card.looked_at, d.card.remaining, strict=True)
-        },
-        "gate": {m: {"chi_square_per_dof": d.gate.ratio[m], "limit": d.gate.limit[m]} for m in d.gate.ratio},
+        **card_result(d.card),
+        "gate": gate_result(d.gate),
         "not_tested": dict(d.untested),
         "parameters_before": parameters(d.fits[NONE], d.scored.temperature, area),
         "parameters_after": parameters(d.best, d.scored.temperature, area),
         "bias_removed": bias(d.fits[NONE].parameters, d.best.parameters),
         "noise_bic": dict(d.noise_bic),
-        "separate_by": separate_by(d),
+        "separate_by": remedies(d.scored, d.card, d.verdict, d.untested),
         "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
         "warnings": warnings + ([_edge()] if d.fits[NONE].at_edge else []),
         "remarks": list(look.remarks),
@@ -73,7 +69,7 @@ def _single(d: Diagnosis) -> list[str]:
     return [n for n in d.card.names if n in d.fits]
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
@@ -84,18 +80,38 @@ def estimate(d: Diagnosis, name: str) -> dict[str, Any]:
     return {"value": float(value), "unit": effect(name).magnitude.unit, "interval_95": interval.tolist()}
 
 
-def cannot_exclude(d: Diagnosis) -> list[str]:
+def card_result(c: Card) -> dict[str, Any]:
+    """What could have been seen and told apart."""
+    return {
+        "detection_limit": {
+            n: {"value": finite(limit), "unit": effect(n).magnitude.unit, "d_prime_at_most": float(at_most)}
+            for n, limit, at_most in zip(c.names, c.limit, c.d_prime, strict=True)
+        },
+        "remaining_d_prime": {
+            n: {"value": float(v), **dict(zip(c.names, row.tolist(), strict=True))}
+            for n, v, row in zip(c.names, c.looked_at, c.remaining, strict=True)
+        },
+    }
+
+
+def gate_result(gate: Gate) -> dict[str, dict[str, float]]:
+    """What the best explanation leaves, by mode."""
+    return {m: {"chi_square_per_dof": gate.ratio[m], "limit": gate.limit[m]} for m in gate.ratio}
+
+
+def excluded_not(scored: Scored, card: Card, verdict: Verdict, untested: Mapping[str, str]) -> list[str]:
     """Effects these data do not rule out: untested, too small to be seen, or still in the 90 % set."""
-    likely = {n for label in d.scored.credible() if label != NONE for n in label.split(" + ")}
-    found = {*d.untested, *d.card.hidden, *likely, *(m for n in d.verdict.named for m in d.card.class_of(n))}
-    return sorted(found - set(d.verdict.named if d.verdict.kind == "cause" else ()))
+    likely = {n for label in scored.credible() if label != NONE for n in label.split(" + ")}
+    found = {*untested, *card.hidden, *likely, *(m for n in verdict.named for m in card.class_of(n))}
+    return sorted(found - set(verdict.named if verdict.kind == CAUSE else ()))
 
 
-def separate_by(d: Diagnosis) -> list[str]:
+def remedies(scored: Scored, card: Card, verdict: Verdict, untested: Mapping[str, str]) -> list[str]:
     """What to measure next, for what is named and its rivals first, then for what cannot be seen."""
-    labels = [label for label in d.scored.credible() if label != NONE]
-    first = [n for label in labels for n in label.split(" + ")] + list(d.verdict.named)
-    return [f"{n}: {effect(n).remedy}" for n in dict.fromkeys([*first, *cannot_exclude(d)])]
+    labels = [label for label in scored.credible() if label != NONE]
+    first = [n for label in labels for n in label.split(" + ")] + list(verdict.named)
+    hidden = excluded_not(scored, card, verdict, untested)
+    return [f"{n}: {effect(n).remedy}" for n in dict.fromkeys([*first, *hidden])]
 
 
 def closure_result(c: Closure) -> dict[str, Any]:
@@ -112,7 +128,7 @@ def closure_result(c: Closure) -> dict[str, Any]:
 def share_result(share: Share) -> dict[str, Any]:
     """What is closed of all data or of a channel; distances in standard deviations of noise and discrepancy."""
     return {
-        "fraction": _finite(share.fraction),
+        "fraction": finite(share.fraction),
         "interval_95": None if share.nothing else list(share.interval),
         "nothing_to_close": share.nothing,
         "scaled_before": share.before,
@@ -122,7 +138,7 @@ def share_result(share: Share) -> dict[str, Any]:
 
 
 def _distance(d: Distance) -> dict[str, float | None]:
-    return {"displacement_um": _finite(d.displacement_um), "load_n": _finite(d.load_n), "scaled": _finite(d.scaled)}
+    return {"displacement_um": finite(d.displacement_um), "load_n": finite(d.load_n), "scaled": finite(d.scaled)}
 
 
 def bond_area(bundle: Bundle) -> float:

@@ -26,7 +26,7 @@ from pipeline.store.results import prepare_output
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import build_model
-from pipeline.study.diagnose import ENGINE, Simulator, band_of
+from pipeline.study.diagnose_case import ENGINE, Simulator, band_of
 from pipeline.study.diagnose_sight import beside, seen
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.virtual_test import virtual_test

@@ -42,6 +42,30 @@ def results_folder(out: Path, bundle: Bundle) -> Path:
     return prepare_output(out)
 
 
+def joint_folder(out: Path, names: list[str]) -> Path:
+    """Make OUT for what several bundles say together; result.json names them under `bundle`.
+
+    Raises
+    ------
+    InputError
+        where OUT is a bundle, or holds the results of other bundles
+    StoreError
+        where it cannot be written
+    """
+    out, joint = Path(out), joined(names)
+    if (out / FILE).exists():
+        raise InputError(f"{out} is a bundle: results get a folder of their own, choose another -o")
+    owner = _owner(out)
+    if owner not in (None, joint):
+        raise InputError(f"{out} holds the results of {owner!r}, they would be lost: choose another -o for {joint!r}")
+    return prepare_output(out)
+
+
+def joined(names: list[str]) -> str:
+    """What result.json calls several bundles together, in whatever order they are given."""
+    return " + ".join(sorted(names))
+
+
 @contextmanager
 def virtual_test_folder(out: Path) -> Iterator[None]:
     """Let a virtual test be made in OUT; one that was stopped may be made again there, a measured one stays.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.core.curve import LoadCurve
-from pipeline.core.errors import MissingFileError, UnavailableError
+from pipeline.core.errors import InputError, MissingFileError
 from pipeline.core.field import DisplacementField
 from pipeline.core.specimen import SingleEdgeNotchedBeam
 from pipeline.gap.effects import library
@@ -18,6 +18,7 @@ from pipeline.gap.library import nearest, parse, shipped, written
 from pipeline.store.bundle import read_bundle
 from pipeline.study.diagnose import diagnose
 from pipeline.study.diagnose_sight import abscissae, clear_of, crack_path, own_path, seen, sides
+from pipeline.study.diagnose_together import folders
 from pipeline.study.virtual_test import virtual_test
 
 BEAM = SingleEdgeNotchedBeam(60e-3, 130e-3, 137e-3, 40e-3, 15e-3)
@@ -72,9 +73,34 @@ def test_it_works_with_one_channel_and_says_what_it_cannot_see(bundle, tmp_path,
     assert {cell["channel"] for cell in result["where"]} == {"load" if lacking == "fields.h5" else "field"}
 
 
-def test_several_bundles_are_refused_by_name(tmp_path):
-    with pytest.raises(UnavailableError, match="one at a time"):
-        diagnose([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+@pytest.mark.slow
+def test_replicates_are_read_together_and_predict_each_other(bundle, tmp_path):
+    other = tmp_path / "other"
+    virtual_test(other, seed=6, radius_mm=2.0, effect=[("fixture_compliance_um_per_kn", 40.0)])
+    without = [n for n, e in library().items() if e.kind == "physics" and n not in KEPT]
+    told = diagnose([bundle, other], tmp_path / "out", grid=GRID, without=without, workers=1)
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    assert set(result) >= KEYS | {"bundles", "transfer"}
+    assert "2 tests" in told
+    alone = [json.loads((tmp_path / "out" / n / "result.json").read_text("utf-8")) for n in ("let-go", "other")]
+    for label in ("none", "fixture_compliance_um_per_kn", "modulus"):
+        middle = np.median([r["log_bayes"][label] for r in alone])
+        assert result["log_bayes"][label] == pytest.approx(middle, abs=1e-9)
+    rows = [t for t in result["transfer"] if t["explanation"] == "fixture_compliance_um_per_kn"]
+    assert {t["target"] for t in rows} == {"let-go", "other"}
+    for row in rows:  # the same set-up: the compliance of one is that of the other
+        assert row["carried"] == ["f_max", "delta_max", "fixture_compliance_um_per_kn"]
+        assert row["channels"]["field"]["fraction"] > 0.5
+    assert (tmp_path / "out" / "report.html").exists()
+    with pytest.raises(InputError, match="holds the results of bundle 'let-go \\+ other'"):
+        diagnose([bundle], tmp_path / "out")
+
+
+def test_two_bundles_of_one_name_are_told_apart_by_their_folders(bundle, tmp_path):
+    again = read_bundle(shutil.copytree(bundle, tmp_path / "again"))
+    assert list(folders([read_bundle(bundle), again])) == ["let-go", "again"]
+    with pytest.raises(InputError, match="the same name"):
+        folders([again, again])
 
 
 def test_a_bundle_without_anything_measured_is_refused(bundle, tmp_path):

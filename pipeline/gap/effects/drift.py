@@ -16,6 +16,7 @@ class Drift(MeasurementEffect):
     says = "specimen and camera drift against each other"
     magnitude = Magnitude(0.0, 30.0, 6.0, "µm/min", directions=2)
     remedy = "film the specimen unloaded for as long as a test, or a fixed mark beside it"
+    belongs = "test"
 
     def distort(self, value: np.ndarray, sight: Sight, reading: Reading) -> Reading:
         direction = np.append(value, 0.0)[:2]  # one component: along x

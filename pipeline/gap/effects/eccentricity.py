@@ -16,6 +16,7 @@ class Eccentricity(PhysicsEffect):
     says = "the load acts beside the notch line"
     magnitude = Magnitude(-8.0, 8.0, 2.0, "mm")
     remedy = "measure where the platen touches; film both supports"
+    belongs = "test"
 
     def change(self, value: float, plan: Plan) -> Plan:
         return replace(plan, eccentricity=value * MM)

@@ -15,6 +15,7 @@ class Magnification(MeasurementEffect):
     says = "the picture grows during the test (out-of-plane motion)"
     magnitude = Magnitude(-0.003, 0.003, 0.0007, "1")
     remedy = "film an unloaded plate beside the specimen, or use a second camera or a telecentric lens"
+    belongs = "test"
 
     def distort(self, value: np.ndarray, sight: Sight, reading: Reading) -> Reading:
         share = value[0] * sight.cmod / sight.end_cmod

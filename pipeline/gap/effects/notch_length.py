@@ -17,6 +17,7 @@ class NotchLength(PhysicsEffect):
     says = "the notch is longer than nominal"
     magnitude = Magnitude(-4.0, 4.0, 1.0, "mm")
     remedy = "measure the notch on the broken halves"
+    belongs = "test"
 
     def change(self, value: float, plan: Plan) -> Plan:
         specimen: Any = plan.specimen

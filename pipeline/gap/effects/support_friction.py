@@ -15,6 +15,7 @@ class SupportFriction(PhysicsEffect):
     says = "supports or pins rub"
     magnitude = Magnitude(0.0, 0.5, 0.15, "1")
     remedy = "use rollers or needle bearings; an unload–reload loop shows twice the friction"
+    belongs = "set-up"
 
     def change(self, value: float, plan: Plan) -> Plan:
         return replace(plan, friction=value)

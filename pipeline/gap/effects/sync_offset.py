@@ -15,6 +15,7 @@ class SyncOffset(MeasurementEffect):
     says = "frames are late against the load record"
     magnitude = Magnitude(-4.0, 4.0, 1.0, "s")
     remedy = "show the machine's trigger in the pictures, or film the loading's start at a higher rate"
+    belongs = "test"
 
     def field_at(self, value: np.ndarray, sight: Sight, cmod: np.ndarray) -> np.ndarray:
         return np.interp(sight.time - value[0], *_line(sight.time, cmod))

@@ -31,6 +31,7 @@ class ThermalGradient(PhysicsEffect):
     says = "temperature changes over the depth of the specimen"
     magnitude = Magnitude(-0.6, 0.6, 0.2, "1")
     remedy = "log the temperature at mouth and back of a dummy specimen; condition longer"
+    belongs = "test"
 
     def change(self, value: float, plan: Plan) -> Plan:
         return plan.with_bonds(Slope(value))

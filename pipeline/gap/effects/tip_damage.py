@@ -16,6 +16,7 @@ class TipDamage(PhysicsEffect):
     says = "the material at the notch tip is damaged before the test"
     magnitude = Magnitude(0.0, 0.95, 0.3, "1")
     remedy = "look at the tip under a microscope or in CT; polish or pre-crack it"
+    belongs = "test"
 
     def change(self, value: float, plan: Plan) -> Plan:
         return replace(plan, spent=value, spent_radius=3 * MM)
