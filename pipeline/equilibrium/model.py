@@ -10,9 +10,7 @@ import numpy as np
 from pipeline.core.problem import BondLaw, Problem
 from pipeline.equilibrium.constraints import Constraints
 from pipeline.equilibrium.network import FiniteNetwork, Network, SmallNetwork, whole_network
-from pipeline.materials.cohesive import central_law
 from pipeline.materials.memory import Memory, at_rest
-from pipeline.materials.mixed_softening import MixedSoftening
 
 
 class Model(Protocol):
@@ -58,8 +56,7 @@ def whole_model(problem: Problem) -> WholeModel:
     weight = np.zeros(constraints.drive.size)
     np.add.at(weight, constraints.per * problem.gauge.index, problem.gauge.weight)
     drive = float(weight @ constraints.drive)
-    law = problem.law if isinstance(problem.law, MixedSoftening) else central_law(problem.law, "equilibrium")
-    return WholeModel(law, network, constraints, constraints.expand.T @ weight, drive)
+    return WholeModel(problem.law, network, constraints, constraints.expand.T @ weight, drive)
 
 
 @dataclass(frozen=True)
@@ -71,6 +68,7 @@ class State:
     free : (q,) array, m; machine : float, m; the variables
     load : float, N; machine load; cmod : float, m
     memory : Memory; the model's bonds
+    time : float, s; how long the test has taken so far, 0 where nothing asks
     energy : float, J; stored and used up
     residual : float, N; largest force out of balance on a free variable
     error : float; estimated relative error of the displacements
@@ -82,6 +80,7 @@ class State:
     load: float
     cmod: float
     memory: Memory
+    time: float = 0.0
     energy: float = 0.0
     residual: float = 0.0
     error: float = 0.0

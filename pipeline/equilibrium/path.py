@@ -9,7 +9,6 @@ import numpy as np
 from pipeline.core.errors import ConvergenceError
 from pipeline.equilibrium.model import ElasticResponse, State, moved_at_once, rest
 from pipeline.equilibrium.step import Stepper
-from pipeline.materials.memory import at_rest
 
 HALVINGS = 4  # of an increment in which load or energy leap, before that is taken for a jump
 
@@ -28,12 +27,14 @@ class Increments:
     near : float; up to the peak and behind it as long as the load exceeds `near_load` of the peak
     near_load : float
     leap : float; largest change of the load in one increment, as a share of the peak
+    fading : float; share of its strength that a creeping bond may lose in one increment, were it held
     """
 
     far: float = 1 / 160
     near: float = 1 / 320
     near_load: float = 0.9
     leap: float = 0.1
+    fading: float = 0.02
 
     def opening(self, state: State, peak: float, last: float, stations: np.ndarray) -> float:
         """How far (m) the next increment should open the mouth; it ends at a station that is near."""
@@ -73,11 +74,25 @@ class Path:
 
     def begin(self, elastic: ElasticResponse) -> tuple[State, State]:
         """Rest, and the state at which the first bond starts to soften or a first elastic increment ends."""
-        model = self.stepper.model
-        usage = float(np.max(at_rest(model.law).trial(0.0).usage(elastic.deformation), initial=0.0))
+        model, start = self.stepper.model, rest(self.stepper.model)
+        usage = float(np.max(start.memory.trial(0.0).usage(elastic.deformation), initial=0.0))
         self._stiff = 1 / elastic.cmod
         machine = 4 * self.increments.far * self.last / elastic.cmod
-        return rest(model), moved_at_once(model, elastic, min(machine, 1 / usage) if usage > 0 else machine)
+        first = moved_at_once(model, elastic, min(machine, 1 / usage) if usage > 0 else machine)
+        if self.stepper.clock is None:
+            return start, first
+        return start, self._crept_there(start, first, elastic)
+
+    def _crept_there(self, start: State, first: State, elastic: ElasticResponse) -> State:
+        """The equilibrium that a first motion of the machine leads to in the time that it takes."""
+        for halving in range(HALVINGS + 1):
+            machine = first.machine / 2**halving
+            if first.memory.fading(self.stepper.duration(start, machine * elastic.cmod)) <= self.increments.fading:
+                break
+        found = self.stepper.by_machine(start, machine * elastic.free, machine)
+        if found is None:
+            raise ConvergenceError("no first equilibrium found: allow more iterations or a larger tolerance")
+        return found
 
     def done(self, state: State) -> bool:
         """Whether the last CMOD is reached."""
@@ -88,7 +103,15 @@ class Path:
         self.peak = max(self.peak, state.load)
         wanted = self.increments.opening(state, self.peak, self.last, self.stations)
         growth = float(np.clip(2 * (state.cmod - before.cmod) / wanted, 1 / 16, 1))
-        return self.advance(before, state, growth * wanted)
+        return self.advance(before, state, self._soon(state, growth * wanted))
+
+    def _soon(self, state: State, wanted: float) -> float:
+        """An opening (m) that takes so little time that no bond fades by more than is allowed."""
+        for _ in range(HALVINGS):
+            if state.memory.fading(self.stepper.duration(state, state.cmod + wanted)) <= self.increments.fading:
+                break
+            wanted /= 2
+        return wanted
 
     def advance(self, before: State, state: State, wanted: float) -> State:
         """The next equilibrium, at most `wanted` (m) further open, less where the load or the energy would leap."""

@@ -17,6 +17,7 @@ from pipeline.equilibrium.path import Increments, Path
 from pipeline.equilibrium.record import Record
 from pipeline.equilibrium.step import Stepper
 from pipeline.equilibrium.watch import Watch
+from pipeline.materials.creeping_softening import refuse_timeless
 
 TOLERANCE = 2e-4  # five times larger, and a crack may stay on a path that is no minimum any more
 
@@ -89,10 +90,12 @@ class _Journey:
         elastic = Stepper(self.whole).elastic()
         self.record = Record(problem)
         self.model: WholeModel | CondensedModel = self.whole
-        stepper = Stepper(self.whole, limit=limit)
+        strongest = float(np.abs(problem.law.k_n * elastic.deformation[: problem.bonds.count]).max())
+        first = strongest * 4 * (increments.far * problem.cmod_max / elastic.cmod)
+        force = tolerance * _reference_force(problem, first)
+        stepper = Stepper(self.whole, force, limit, clock=problem.clock)
         self.path = Path(stepper, problem.cmod_max, problem.stations, increments, snap_back)
         self.before, self.state = self.path.begin(elastic)
-        stepper.tolerance = tolerance * _reference_force(problem, self.state.memory.opening)
         for state, before in ((self.before, None), (self.state, self.before)):
             self.record.add(state, before, self.fields)
         self.watch, self.looked = Watch(), 1
@@ -171,13 +174,14 @@ def _refuse(problem: Problem, tolerance: float) -> None:
         raise InputError(f"tolerance = {tolerance:g} must lie between 0 and 1: it is a share of the smallest f_max")
     if not problem.cmod_max > 0:
         raise InputError(f"cmod_max = {problem.cmod_max:g} m must be positive")
+    refuse_timeless(problem)
     if problem.law.k_n.size != problem.bonds.count:
         raise InputError(f"the law has {problem.law.k_n.size} entries for {problem.bonds.count} bonds: give one a bond")
 
 
-def _reference_force(problem: Problem, opening: np.ndarray) -> float:
-    """The smallest strength; without any, the largest tension of the first elastic increment."""
+def _reference_force(problem: Problem, elastic: float) -> float:
+    """The smallest strength; without any, the largest tension (N) of a first elastic increment."""
     law = problem.law
     strength = np.append(law.f_max, law.f_shear) if isinstance(law, SlidingLaw) else law.f_max
     finite = strength[np.isfinite(strength) & np.isfinite(np.resize(law.f_max, strength.size))]
-    return float(finite.min()) if finite.size else float(np.abs(problem.law.k_n * opening).max())
+    return float(finite.min()) if finite.size else elastic

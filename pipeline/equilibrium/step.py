@@ -6,11 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.core.clock import Clock
 from pipeline.equilibrium.factor import factorise_elastic
 from pipeline.equilibrium.minimise import Minimum, minimise
 from pipeline.equilibrium.model import ElasticResponse, Model, State
 from pipeline.equilibrium.potential import Potential, SecantPreconditioner
-from pipeline.materials.memory import Memory, at_rest
+from pipeline.materials.memory import at_rest
+
+CORRECTIONS = 8  # of the duration of an increment under machine control
+PUNCTUAL = 5e-3  # share of an increment's duration by which it may miss the clock; the next one makes up for it
 
 
 @dataclass
@@ -24,6 +28,7 @@ class Stepper:
     limit : int; iterations after which a minimisation counts as failed
     patience : int; iterations after which a minimisation renews its factorisation
     endurance : int; iterations after which the next minimisation begins with a new one
+    clock : Clock or None; time of the test, for bonds that creep
     """
 
     model: Model
@@ -31,12 +36,17 @@ class Stepper:
     limit: int = 400
     patience: int = 25
     endurance: int = 40
+    clock: Clock | None = None
     _preconditioner: SecantPreconditioner = field(default_factory=SecantPreconditioner, repr=False)
     _spent: int = field(default=0, repr=False)
 
     def on(self, model: Model) -> Stepper:
         """The same stepper for another model."""
-        return Stepper(model, self.tolerance, self.limit, self.patience, self.endurance)
+        return Stepper(model, self.tolerance, self.limit, self.patience, self.endurance, self.clock)
+
+    def duration(self, start: State, cmod: float) -> float:
+        """How long (s) the test takes from an equilibrium to a CMOD; none to one that it had before."""
+        return 0.0 if self.clock is None else max(self.clock.at(cmod) - start.time, 0.0)
 
     def elastic(self) -> ElasticResponse:
         """How the undamaged specimen answers a motion of the machine that takes no time."""
@@ -50,31 +60,50 @@ class Stepper:
         return ElasticResponse(free, load, self._cmod(free, 1.0), deformation)
 
     def by_machine(self, start: State, guess: np.ndarray, machine: float) -> State | None:
-        """The equilibrium at a machine displacement; None where none was found."""
-        found, potential = self._minimum(start.memory, guess, machine, self.tolerance, None)
-        return self._state(found, potential, machine) if found.converged else None
+        """The equilibrium at a machine displacement; None where none was found.
+
+        How long the increment takes, the clock tells of the CMOD that is found. What relaxes at a held machine hardly
+        moves the mouth, so that one or two corrections of an extrapolated duration are enough.
+        """
+        duration = self.duration(start, self._cmod(guess, machine))
+        for _ in range(CORRECTIONS):
+            found, potential = self._minimum(start, duration, guess, machine, self.tolerance, None)
+            if not found.converged:
+                return None
+            true = self.duration(start, self._cmod(found.at, machine))
+            if abs(true - duration) <= PUNCTUAL * true:
+                return self._state(found, potential, machine, start.time + duration)
+            duration, guess = true, found.at
+        return None
 
     def by_gauge(self, start: State, guess: np.ndarray, machine: float, cmod: float) -> State | None:
         """The equilibrium at a CMOD, the machine displacement adjusted until the gauge carries no force."""
         gauge = self.model.gauge
         trials: list[tuple[float, float]] = []
         reach = max(abs(machine - start.machine), 0.01 * abs(start.machine))
+        duration = self.duration(start, cmod)
         for _ in range(15):
             miss = cmod - self._cmod(guess, machine)
             guess = guess + gauge * (miss / (gauge @ gauge))
-            found, potential = self._minimum(start.memory, guess, machine, 0.5 * self.tolerance, gauge)
+            found, potential = self._minimum(start, duration, guess, machine, 0.5 * self.tolerance, gauge)
             if not found.converged:
                 return None
             if abs(found.multiplier) * np.abs(gauge).max() <= 0.5 * self.tolerance:
-                return self._state(found, potential, machine)
+                return self._state(found, potential, machine, start.time + duration)
             trials.append((machine, found.multiplier))
             machine, guess = _next_trial(trials, reach), found.at
         return None
 
     def _minimum(
-        self, memory: Memory, guess: np.ndarray, machine: float, tolerance: float, constraint: np.ndarray | None
+        self,
+        start: State,
+        duration: float,
+        guess: np.ndarray,
+        machine: float,
+        tolerance: float,
+        constraint: np.ndarray | None,
     ) -> tuple[Minimum, Potential]:
-        potential = Potential(self.model.network, memory)
+        potential = Potential(self.model.network, start.memory, duration)
         self._preconditioner.move(potential, machine)
         if self._preconditioner.factor is None or self._spent >= self.endurance:
             self._preconditioner.renew(guess)
@@ -91,7 +120,7 @@ class Stepper:
         self._spent += found.iterations
         return found, potential
 
-    def _state(self, found: Minimum, potential: Potential, machine: float) -> State:
+    def _state(self, found: Minimum, potential: Potential, machine: float, time: float) -> State:
         gradient, load, deformation = potential.state(found.at, machine)
         memory = potential.settled(deformation)
         size = float(np.linalg.norm(found.at))
@@ -101,6 +130,7 @@ class Stepper:
             load=load,
             cmod=self._cmod(found.at, machine),
             memory=memory,
+            time=time,
             energy=potential.energy(found.at, machine, memory),
             residual=float(np.abs(gradient).max()),
             error=float(np.linalg.norm(found.step)) / size if size else 0.0,

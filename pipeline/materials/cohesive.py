@@ -7,8 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from pipeline.core.errors import InputError, UnavailableError
-from pipeline.core.problem import BondLaw
+from pipeline.core.errors import InputError
 from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
 Factor = np.ndarray | float
@@ -171,21 +170,6 @@ class LinearSoftening(CentralSoftening):
         at = np.where(softened, np.minimum(reached, self.delta_max), 0.0)
         strength, peak = np.where(softened, self.f_max, 0.0), np.where(softened, self.delta_peak, 0.0)
         return 0.5 * (strength * at - self.envelope(at) * peak)
-
-
-def central_law(law: BondLaw, engine: str) -> CentralSoftening:
-    """The law of bonds that neither slide nor creep, for an engine that follows no others.
-
-    Raises
-    ------
-    UnavailableError
-        for any other law
-    """
-    if isinstance(law, CentralSoftening):
-        return law
-    raise UnavailableError(
-        f"the engine {engine} does not follow {type(law).__name__}: bonds that slide or creep need another"
-    )
 
 
 def refuse_values(k_n: np.ndarray, f_max: np.ndarray, delta_max: np.ndarray) -> None:

@@ -5,7 +5,9 @@ only. Below f_max the force is that of the Maxwell arms, whatever the opening. W
 an opening δ*, softening begins: from (δ*, f_max), a straight line to (δ_max, 0) or another shape g(s) along
 s = (δ − δ*)/(δ_max − δ*); creep stops, unloading goes to the origin along the secant, or elastically with K(0) down to
 a plastic opening. A bond with δ* ≥ δ_max breaks at once. Undamaged bonds creep in compression too; damaged
-ones are elastic there, with K(0), and so carry no tension while they are closed, wherever δ* lay.
+ones are elastic there, with K(0). A bond that crept under compression has become shorter: where its δ* lies below
+f_max/K(0), its origin p = δ* − f_max/K(0) is where K(0) leads to (δ*, f_max), p = 0 otherwise. From there openings
+count once it softens, so that its force is continuous and no secant is stiffer than K(0).
 
 Within one step of physical time Δt the force is a function of the opening at its end alone,
 
@@ -17,7 +19,7 @@ another stiffness and another origin, which an engine may minimise as it does wi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,6 +78,11 @@ class CreepingSoftening:
         _refuse("f_max", f_max, f_max > 0, self.rise)
         _refuse("delta_max", delta_max, (delta_max > 0) | ~np.isfinite(f_max), self.rise)
 
+    def of(self, bonds: np.ndarray) -> CreepingSoftening:
+        """The law of some of the bonds: numbers (k,) or bools (m,)."""
+        rise = Arms(self.rise.stiffness[bonds], self.rise.time[bonds], self.rise.left[bonds])
+        return replace(self, rise=rise, f_max=self.f_max[bonds], delta_max=self.delta_max[bonds])
+
     def at_rest(self) -> BondState:
         """Bonds that were never loaded."""
         zero = np.zeros_like(self.rise.left)
@@ -99,8 +106,8 @@ class CreepingSoftening:
         onset = self.onset(state, duration)
         softening = state.softened | (opening >= onset)
         arms = relax(self.rise, state.arms, opening - state.opening, duration)
-        reached = np.maximum(opening, state.reached)
-        return np.where(softening, self.softened_force(opening, reached, onset), total(self.rise, arms, opening))
+        softened = self.softened_force(opening, self.furthest(state, opening), onset)
+        return np.where(softening, softened, total(self.rise, arms, opening))
 
     def advance(self, state: BondState, opening: np.ndarray, duration: float) -> BondState:
         """The state after a step of `duration` s that ends at `opening` (m,), m."""
@@ -111,8 +118,17 @@ class CreepingSoftening:
             opening=np.array(opening, float),
             arms=np.where(softening[:, None], 0.0, arms),
             onset=np.where(softening, onset, np.inf),
-            reached=np.where(softening, np.maximum(opening, state.reached), 0.0),
+            reached=np.where(softening, self.furthest(state, opening), 0.0),
         )
+
+    def furthest(self, state: BondState, opening: np.ndarray) -> np.ndarray:
+        """Largest opening (m,), m, since softening began, of bonds that have softened by `opening` (m,), m."""
+        return np.where(state.softened, np.maximum(opening, state.reached), opening)
+
+    def origin(self, onset: np.ndarray) -> np.ndarray:
+        """p (m,), m, zero or negative: from where openings of softened bonds count."""
+        some = np.isfinite(onset) & np.isfinite(self.f_max)
+        return np.minimum(np.subtract(onset, self.delta_peak, out=np.zeros_like(self.delta_max), where=some), 0.0)
 
     @property
     def k_n(self) -> np.ndarray:
@@ -163,9 +179,9 @@ class CreepingSoftening:
         return np.where(some, np.where(self.broken(state), self.delta_end, peak + way * (last - peak)), 0.0)
 
     def stored(self, state: BondState) -> np.ndarray:
-        """Recoverable energy (m,), J: of the arms' springs; once softened ½ f δ, or f²/(2 K(0)) if elastic."""
+        """Recoverable energy (m,), J: of the arms' springs; once softened ½ f (δ − p), or f²/(2 K(0)) if elastic."""
         force = self.softened_force(state.opening, state.reached, state.onset)
-        half = force / self.k_n if self.unloading is Unloading.ELASTIC else state.opening
+        half = force / self.k_n if self.unloading is Unloading.ELASTIC else state.opening - self.origin(state.onset)
         return np.where(state.softened, 0.5 * half * force, stored(self.rise, state.arms, state.opening))
 
     def used(self, before: BondState, after: BondState, duration: float) -> np.ndarray:
@@ -191,14 +207,16 @@ class CreepingSoftening:
 
     def softened_force(self, opening: np.ndarray, reached: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """Force (m,), N, of softened bonds: secant or elastic in tension, K(0) in compression."""
-        pulled = opening > 0
+        origin = self.origin(onset)
+        own, top = opening - origin, reached - origin
+        pulled = own > 0
         envelope = self.envelope(reached, onset)
         if self.unloading is Unloading.ELASTIC:
-            tension = np.maximum(envelope - self.k_n * (reached - opening), 0.0)
+            tension = np.maximum(envelope - self.k_n * (top - own), 0.0)
         else:
-            share = np.divide(opening, reached, out=np.zeros_like(self.delta_max), where=pulled & (reached > 0))
+            share = np.divide(own, top, out=np.zeros_like(self.delta_max), where=pulled & (top > 0))
             tension = share * envelope
-        return np.where(pulled, tension, self.k_n * opening)
+        return np.where(pulled, tension, self.k_n * own)
 
     def _softening_work(self, state: BondState) -> np.ndarray:
         """Area of the branch from δ* to the largest opening, less what is stored there (m,), J; 0 if not softened."""
@@ -207,7 +225,8 @@ class CreepingSoftening:
         way = np.maximum(last - onset, 0.0)
         area = np.where(some, self.f_max, 0.0) * way * self.softening.area(self.way(state.reached, state.onset))
         envelope = self.envelope(state.reached, state.onset)
-        top = envelope / self.k_n if self.unloading is Unloading.ELASTIC else state.reached
+        secant = state.reached - self.origin(state.onset)
+        top = envelope / self.k_n if self.unloading is Unloading.ELASTIC else secant
         return np.where(some, area - 0.5 * envelope * top, 0.0)
 
 

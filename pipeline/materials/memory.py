@@ -21,6 +21,7 @@ class Memory(Protocol):
     `follow` brings them to openings and slidings, m, within `duration` s of the test; `tension` and `shear` are their
     forces there, N, `stored` and `used` their energies, J, `reached` the largest opening in m, or its like. `trial` is
     the next step of that duration before its end is known; `settled` follows to the deformation that was found for it.
+    `fading` is the largest share of its strength that an undamaged bond would lose if it were held for so long.
     """
 
     @property
@@ -38,6 +39,7 @@ class Memory(Protocol):
     def follow(self, opening: np.ndarray, sliding: np.ndarray, duration: float) -> Memory: ...
     def trial(self, duration: float) -> Trial: ...
     def settled(self, deformation: np.ndarray, duration: float) -> Memory: ...
+    def fading(self, duration: float) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,9 @@ class CentralMemory:
 
     def settled(self, deformation: np.ndarray, duration: float) -> CentralMemory:
         return self.follow(deformation, np.zeros_like(deformation), duration)
+
+    def fading(self, duration: float) -> float:
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,9 @@ class MixedMemory:
         used = np.where(rubbed, self.used + 0.5 * (self.shear + after.shear) * slip, after.used)
         return replace(after, state=replace(after.state, used=used))
 
+    def fading(self, duration: float) -> float:
+        return 0.0
+
 
 @dataclass(frozen=True)
 class CreepingMemory:
@@ -158,6 +166,11 @@ class CreepingMemory:
 
     def settled(self, deformation: np.ndarray, duration: float) -> CreepingMemory:
         return self.follow(deformation, np.zeros_like(deformation), duration)
+
+    def fading(self, duration: float) -> float:
+        kept, _ = self.law.rising(self.state, duration)
+        pulled = ~self.state.softened & (self.tension > 0)
+        return float(np.max(np.where(pulled, self.tension - kept, 0.0) / self.law.f_max, initial=0.0))
 
 
 def at_rest(law: BondLaw) -> Memory:

@@ -139,27 +139,30 @@ class CreepingTrial:
     def __init__(self, law: CreepingSoftening, state: BondState, duration: float) -> None:
         self.law, self.state = law, state
         self.onset = law.onset(state, duration)
+        self.origin = law.origin(self.onset)
         self.kept, self.elastic = law.rising(state, duration)
 
     def force(self, deformation: np.ndarray) -> np.ndarray:
-        rising = self.kept + self.elastic * (deformation - self.state.opening)
-        softened = self.state.softened | (deformation >= self.onset)
-        reached = np.maximum(deformation, self.state.reached)
-        return np.where(softened, self.law.softened_force(deformation, reached, self.onset), rising)
+        force = self.kept + self.elastic * (deformation - self.state.opening)
+        some = np.flatnonzero(self.state.softened | (deformation >= self.onset))  # few, and costly
+        reached = self.law.furthest(self.state, deformation)[some]
+        force[some] = self.law.of(some).softened_force(deformation[some], reached, self.onset[some])
+        return force
 
     def secant(self, deformation: np.ndarray) -> np.ndarray:
         """Below the strength the tangent of the arms, for their force does not count from the origin."""
         softened = self.state.softened | (deformation >= self.onset)
-        pulled = softened & (deformation > 0)
+        own = deformation - self.origin
+        pulled = softened & (own > 0)
         force = np.where(pulled, self.force(deformation), 0.0)
-        secant = np.where(pulled, force / np.where(pulled, deformation, 1.0), self.law.k_n)
+        secant = np.where(pulled, force / np.where(pulled, own, 1.0), self.law.k_n)
         if self.law.unloading is Unloading.ELASTIC:
             secant = np.where(pulled & (deformation < self.state.reached) & (force > 0), self.law.k_n, secant)
         return np.where(softened, secant, self.elastic)
 
     def softening(self, deformation: np.ndarray) -> np.ndarray:
         begins = ~self.state.softened & (deformation >= self.onset)
-        return begins | (self.state.softened & (deformation > 0) & (deformation >= self.state.reached))
+        return begins | (self.state.softened & (deformation > self.origin) & (deformation >= self.state.reached))
 
     def usage(self, deformation: np.ndarray) -> np.ndarray:
         return deformation / self.law.delta_peak

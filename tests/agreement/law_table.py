@@ -70,6 +70,7 @@ PULLED = np.column_stack([np.array(OPENINGS) * DN, np.zeros((len(OPENINGS), 2))]
 RELAX = slowly((0.6, 0.0, 1), (0.6, 50.0, 20), (0.6, 900.0, 10))
 CREEP = slowly((0.5, 2.0, 10), (1.4, 40.0, 30), (-0.5, 10.0, 10), (1.5, 30.0, 20), (4.0, 20.0, 20))
 FAIL = slowly((3.0, 60.0, 40), (300.0, 5.0, 20), (100.0, 5.0, 4), (-2.0, 1.0, 2), (400.0, 50.0, 5), (3000.0, 1.0, 5))
+SHRUNK = slowly((-3.0, 300.0, 20), (2.0, 0.5, 10), (0.2, 0.5, 2), (60.0, 1.0, 6), (-4.0, 1.0, 4), (3000.0, 5.0, 5))
 
 TABLE = {
     "linear": (LinearSoftening(KN, FN, DN), PULLED),
@@ -88,4 +89,5 @@ TABLE = {
     "relaxation to a rest": (creeping(left=0.3), RELAX),
     **{f"creep, {n}, {u}": (creeping(s, u), CREEP) for n, s in SHAPES.items() for u in Unloading},
     **{f"creep and failure, {n}, {u}": (creeping(s, u, 0.2), FAIL) for n, s in SHAPES.items() for u in Unloading},
+    **{f"creep under compression, {n}, {u}": (creeping(s, u), SHRUNK) for n, s in SHAPES.items() for u in Unloading},
 }

@@ -137,6 +137,39 @@ def test_undamaged_compression_creeps():
     assert later == pytest.approx(-1e-6 * SHARE * MASTIC.relaxation_modulus(50.0), rel=1e-12)  # an exponential
 
 
+@pytest.mark.parametrize("unloading", list(Unloading))
+def test_a_bond_that_crept_under_compression_softens_from_its_own_origin(unloading: Unloading) -> None:
+    """δ* < 0: no force jumps, no secant is stiffer than K(0), and closed it is elastic from where it has no force."""
+    law = replace(bonds(), unloading=unloading)
+    stiffness = float(law.k_n[0])
+    _, state = follow(law, np.array([-3e-6, -3e-6]), np.array([0.0, 400.0]))
+    onset = float(law.onset(state, 0.0)[0])
+    assert onset < 0
+    below, above = (float(law.force(state, np.array([onset * (1 + s)]), 0.0)[0]) for s in (1e-9, -1e-9))
+    assert below == pytest.approx(F, rel=1e-6)
+    assert above == pytest.approx(F, rel=1e-6)
+    state = law.advance(state, np.array([onset + 1e-9]), 0.0)
+    free = onset - F / stiffness  # K(0) leads from there to (δ*, f_max)
+    for opening in (onset, 0.5 * (onset + free), free, free - 1e-6):
+        force = float(law.force(state, np.array([opening]), 1.0)[0])
+        assert force == pytest.approx(stiffness * (opening - free), rel=0.01, abs=0.02 * F)  # softened by a nanometre
+        assert float(law.stored(law.advance(state, np.array([opening]), 0.0))[0]) >= 0
+
+
+@pytest.mark.parametrize("unloading", list(Unloading))
+def test_work_of_a_bond_that_crept_under_compression_is_accounted_for(unloading: Unloading) -> None:
+    law = replace(bonds(), unloading=unloading)
+    path = np.concatenate([np.linspace(0, -3e-6, 50), np.linspace(-3e-6, 1e-5, 4000), np.linspace(1e-5, -2e-6, 500)])
+    state, work, used = law.at_rest(), 0.0, 0.0
+    for a, b in pairwise(path):
+        before, after = law.force(state, np.array([a]), 0.0), law.advance(state, np.array([b]), 0.05)
+        work += 0.5 * float(before[0] + law.force(after, np.array([b]), 0.0)[0]) * (b - a)
+        used += float(law.used(state, after, 0.05)[0])
+        state = after
+    assert state.softened.all()
+    assert float(law.stored(state)[0]) + used == pytest.approx(work, rel=1e-4)  # trapezoids of the work
+
+
 def test_work_is_stored_crept_or_spent_on_the_way_to_the_peak():
     law = bonds()
     openings = np.linspace(0, 0.9 * rate_onset(2e-7), 400)

@@ -49,7 +49,7 @@ def test_trial_forces_are_those_of_the_settled_bonds(name: str, unloading: Unloa
         after = memory.settled(at, duration)
         assert trial.force(at) == pytest.approx(carried(name, after), rel=1e-9, abs=1e-9)  # round-off of sums
         assert np.all(trial.secant(at) >= 0)
-        assert np.all(trial.secant(at) <= trial.elastic.max() * (1 + 1e-12) + 4e8)
+        assert np.all(trial.secant(at) <= 4e8 * (1 + 1e-9))  # K(0): what is stiffer would stall the minimiser
         memory = after
 
 

@@ -73,6 +73,12 @@ inline double creep_envelope(const Law &law, const CreepState &state)
   return law.f_max * law.softening.left(creep_way(law, state));
 }
 
+// from where openings of a softened bond count: below 0 where it has become shorter by creeping under compression
+inline double creep_origin(const Law &law, const CreepState &state)
+{
+  return law.damageable() && state.softened() ? std::fmin(state.onset - law.delta_peak(), 0.0) : 0.0;
+}
+
 // force of a bond whose state has been advanced to its opening
 inline double creep_force(const Law &law, const CreepStep &step, const CreepState &state)
 {
@@ -82,10 +88,10 @@ inline double creep_force(const Law &law, const CreepStep &step, const CreepStat
     for (int a = 0; a < law.arms; a++) force += state.arm[a];
     return step.left * delta + force;
   }
-  if (!(delta > 0.0)) return law.k_n * delta;
+  const double origin = creep_origin(law, state), own = delta - origin, top = state.reached - origin;
+  if (!(own > 0.0)) return law.k_n * own;
   const double envelope = creep_envelope(law, state);
-  return law.elastic_unloading ? std::fmax(envelope - law.k_n * (state.reached - delta), 0.0)
-                               : delta / state.reached * envelope;
+  return law.elastic_unloading ? std::fmax(envelope - law.k_n * (top - own), 0.0) : own / top * envelope;
 }
 
 inline double creep_stored(const Law &law, const CreepStep &step, const CreepState &state)
@@ -93,7 +99,7 @@ inline double creep_stored(const Law &law, const CreepStep &step, const CreepSta
   const double delta = state.opening;
   if (state.softened()) {
     const double force = creep_force(law, step, state);
-    return 0.5 * force * (law.elastic_unloading ? force / law.k_n : delta);
+    return 0.5 * force * (law.elastic_unloading ? force / law.k_n : delta - creep_origin(law, state));
   }
   double springs = 0.0;
   for (int a = 0; a < law.arms; a++) springs += state.arm[a] * state.arm[a] / (2.0 * step.stiffness[a]);
@@ -106,7 +112,7 @@ inline double creep_softening_work(const Law &law, const CreepState &state)
   if (!law.damageable() || !state.softened()) return 0.0;
   const double area = law.f_max * std::fmax(law.delta_max - state.onset, 0.0) * law.softening.area(creep_way(law, state));
   const double envelope = creep_envelope(law, state);
-  return area - 0.5 * envelope * (law.elastic_unloading ? envelope / law.k_n : state.reached);
+  return area - 0.5 * envelope * (law.elastic_unloading ? envelope / law.k_n : state.reached - creep_origin(law, state));
 }
 
 inline void creep_on(const Law &law, const CreepStep &step, CreepState &state, double opening)
@@ -126,7 +132,7 @@ inline void begin_to_soften(const Law &law, const CreepStep &step, CreepState &s
   state.used += creep_stored(law, step, state) + 0.5 * (before + law.f_max) * (onset - state.opening);
   for (int a = 0; a < law.arms; a++) state.arm[a] = 0.0;
   state.onset = onset != 0.0 ? onset : 1e-300;
-  state.reached = std::fmax(opening, 0.0);
+  state.reached = opening;
   state.opening = opening;
   state.used += creep_softening_work(law, state);
 }
