@@ -171,6 +171,7 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
         diagnose_result.closure_result,
         diagnose_result.share_result,
         diagnose_result.card_result,
+        diagnose_result.scatter_result,
         diagnose_together.together_result,
         diagnose_together.transfer_result,
         diagnose_together._one,

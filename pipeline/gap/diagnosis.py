@@ -29,6 +29,7 @@ from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance
 FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, for effects pull parameters away
 MOVES = 3  # how often the grid follows the best of the explanations that need no simulation
 BESIDE = (0.002, -0.002)  # of f_max: where a node is tried again at which no equilibrium is found
+NUDGES = ((0.003, 0.0), (0.0, 0.003), (-0.003, -0.003))  # of the parameters, relative: what may not matter
 LIKELY = 0.05  # probability from which a physics effect is simulated again at its best point
 CONFIRMED = 3  # at most so many
 CLOSED = 3  # best explanations whose closure is looked at
@@ -252,23 +253,33 @@ def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple
 
 
 def scatter(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
-    """Covariance (n, n) of what changes from simulation to simulation without order (crack paths that jump)."""
+    """Covariance (n, n) of what changes from simulation to simulation without order (crack paths that jump).
+
+    From node to node of the grid what no smooth function of the parameters has; and what nudges of the parameters
+    change beside the point that all effects are simulated at.
+    """
     nodes = [np.array([f, d]) for f in emulator.f_max for d in emulator.delta_max]
     seen = np.reshape(
         [emulator.reading(node).flat()[mask] for node in nodes],
         (emulator.f_max.size, emulator.delta_max.size, -1),
     )
-    return node_covariance(LagrangeSurrogate(emulator.f_max, emulator.delta_max, seen))[0]
+    nodes_differ = node_covariance(LagrangeSurrogate(emulator.f_max, emulator.delta_max, seen))[0]
+    jitter = emulator.jitter(mask)
+    return nodes_differ + jitter.T @ jitter / max(len(jitter), 1)
 
 
 def with_signatures(
     emulator: Emulator, simulate: Simulate, parameters: np.ndarray, names: Sequence[str]
 ) -> tuple[Emulator, dict[str, str]]:
-    """Simulate every physics effect at two values; those that cannot be simulated are returned with the reason."""
+    """Simulate every physics effect at two values, and nudges of the parameters.
+
+    Effects that cannot be simulated are returned with the reason.
+    """
     wanted = [n for n in names if not isinstance(effect(n), MeasurementEffect)]
     at = (float(parameters[0]), float(parameters[1]))
     runs = [Run(*at)] + [Run(*at, ((n, v),)) for n in wanted for v in effect(n).magnitude.trials]
-    reference, *others = simulate(runs)
+    beside = [Run(at[0] * (1 + f), at[1] * (1 + d)) for f, d in NUDGES]
+    reference, *others = simulate([*runs, *beside])
     if isinstance(reference, str):
         raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {reference}")
     signatures, untested = {}, {}
@@ -280,8 +291,13 @@ def with_signatures(
             continue
         changes = np.array([o.flat() - reference.flat() for o in both if not isinstance(o, str)])
         signatures[name] = Signature(np.array(effect(name).magnitude.trials), changes)
-    placed = replace(emulator, signatures=signatures)
-    return placed.confirmed(parameters, reference.flat()), untested
+    again = [
+        (np.array([r.f_max, r.delta_max]), o.flat())
+        for r, o in zip(beside, others[-len(beside) :], strict=True)
+        if not isinstance(o, str)
+    ]
+    placed = replace(emulator, signatures=signatures).confirmed(parameters, reference.flat())
+    return replace(placed, again=tuple(again)), untested
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,6 +56,8 @@ class Emulator:
     values : (n_f, n_d, n) array of `Response.flat`
     signatures : effect → Signature, physics effects only
     offset : (n,) array; added to everything, so that a confirmed point is met exactly
+    again : (parameters (2,), `Response.flat` (n,)) of simulations beside a confirmed point, which the function is not
+        drawn through: what they differ by from it is scatter
     """
 
     sight: Sight
@@ -65,6 +67,7 @@ class Emulator:
     values: np.ndarray
     signatures: Mapping[str, Signature] = field(default_factory=dict)
     offset: np.ndarray | float = 0.0
+    again: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @cached_property
     def _known(self) -> np.ndarray:
@@ -180,6 +183,11 @@ class Emulator:
     def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
         """Moved by what a simulation without effects at these parameters, `Response.flat` (n,), says otherwise."""
         return replace(self, offset=self.offset + simulated - self.response(parameters, {}).flat())
+
+    def jitter(self, mask: np.ndarray) -> np.ndarray:
+        """What the simulations beside a confirmed point differ by from the function; (j, n) of the data."""
+        rows = [self.confirmed(at, flat).reading(at) - self.reading(at) for at, flat in self.again]
+        return np.array([row.flat()[mask] for row in rows]).reshape(len(rows), int(mask.sum()))
 
     def with_confirmed(self, name: str, value: float, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
         """The same for an effect: its signature then meets the simulation of this value at these parameters."""

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pipeline import __version__
-from pipeline.core.units import MM
+from pipeline.core.units import MM, UM
 from pipeline.gap.closure import Closure, Distance, Share
-from pipeline.gap.diagnosis import Diagnosis
+from pipeline.gap.diagnosis import Diagnosis, scatter
 from pipeline.gap.effects import effect, library
 from pipeline.gap.fit import Fitted
 from pipeline.gap.gate import Gate
@@ -47,6 +47,7 @@ def diagnosis_result(
         "closure": {label: closure_result(c) for label, c in d.closures.items()},
         **card_result(d.card),
         "gate": gate_result(d.gate),
+        "scatter": scatter_result(d),
         "not_tested": dict(d.untested),
         "parameters_before": parameters(d.fits[NONE], d.scored.temperature, area),
         "parameters_after": parameters(d.best, d.scored.temperature, area),
@@ -97,6 +98,23 @@ def card_result(c: Card) -> dict[str, Any]:
 def gate_result(gate: Gate) -> dict[str, dict[str, float]]:
     """What the best explanation leaves, by mode."""
     return {m: {"chi_square_per_dof": gate.ratio[m], "limit": gate.limit[m]} for m in gate.ratio}
+
+
+def scatter_result(d: Diagnosis) -> dict[str, dict[str, float | None]]:
+    """How far simulations scatter without order: over the grid, and by nudges of the parameters; root mean squares."""
+    mask = d.observation.mask
+    is_field = (np.arange(mask.size) < d.observation.reading.field.size)[mask]
+    jitter = d.emulator.jitter(mask)
+    by_nudges = np.mean(jitter**2, axis=0) if len(jitter) else None
+    sizes = {"all": np.diag(scatter(d.emulator, mask)), "by_nudges": by_nudges}
+    found: dict[str, dict[str, float | None]] = {}
+    for name, square in sizes.items():
+        field, load = (
+            None if square is None or not part.any() else float(np.sqrt(np.mean(square[part])))
+            for part in (is_field, ~is_field)
+        )
+        found[name] = {"displacement_um": None if field is None else field / UM, "load_n": load}
+    return found
 
 
 def excluded_not(scored: Scored, card: Card, verdict: Verdict, untested: Mapping[str, str]) -> list[str]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.diagnosis import diagnose
+from pipeline.gap.diagnosis import diagnose, scatter, weighed
 from pipeline.gap.effects import library
+from pipeline.gap.identifiability import card
 from pipeline.gap.observation import Observation, Reading
 from tests.gap.scene import ABSCISSAE, PHYSICS, START, entry, measured, simulate
 
@@ -28,7 +29,7 @@ def test_a_fixture_that_gives_way_is_named_and_measured():
     assert low < 20 < high
     assert d.closures["fixture_compliance_um_per_kn"].fraction > 0.8
     assert d.card.limit[d.card.names.index("fixture_compliance_um_per_kn")] < 20
-    assert d.runs == 9 + 1 + 2  # the grid, the fit itself, the modulus at two values
+    assert d.runs == 9 + 1 + 2 + 3  # the grid, the fit itself, the modulus at two values, nudges
 
 
 def test_a_test_that_lacks_nothing_needs_nothing():
@@ -55,10 +56,56 @@ def test_the_order_of_points_and_effects_does_not_matter():
         assert two.scored.probability[label] == pytest.approx(p, abs=1e-4)  # steps end at another round-off
 
 
+def test_the_seed_moves_intervals_of_closure_and_nothing_else():
+    test = measured(["cmod_gain"], [0.06], np.random.default_rng(3))
+    one, two = (
+        diagnose(test, ABSCISSAE, simulate, START, entry(), np.random.default_rng(seed), SOME[:2], FEW)
+        for seed in (0, 1)
+    )
+    assert one.verdict == two.verdict
+    assert one.scored == two.scored
+    assert one.cells == two.cells
+    a, b = (d.closures["cmod_gain"].whole for d in (one, two))
+    assert (a.before, a.after) == (b.before, b.after)
+    for x, y in ((a, b), (b, a)):
+        assert y.interval[0] < x.fraction < y.interval[1]
+
+
+def test_more_noise_never_shows_more():
+    """d′ of every effect falls, and its detection limit rises, with the noise of the camera and of the load cell."""
+    test = measured(rng=np.random.default_rng(2))
+    emulator = found(test).emulator
+    before = None
+    for factor in (1.0, 1.5, 4.0, 20.0):
+        loud = replace(test, field_std=factor * test.field_std, load_std=factor * test.load_std)
+        seen, data = weighed(loud, emulator, entry())
+        singles = {n: emulator.candidate([n], seen.mask) for n in SOME}
+        now = card(singles, data, np.array([1.03, 0.95]))
+        if before is not None:
+            assert (now.d_prime < before.d_prime).all()
+            assert (now.limit >= before.limit).all()
+        before = now
+
+
 def test_what_cannot_be_simulated_is_said_not_left_out():
     d = found(measured(rng=np.random.default_rng(5)), ["creep", "modulus"])
     assert d.untested == {"creep": "the hinge knows no creep"}
     assert "creep" not in d.scored.probability
+
+
+def test_simulations_that_jump_widen_the_metric():
+    """A load that jumps by ±40 N from run to run, beside the grid alone: the nudges see it."""
+
+    def jumping(runs):
+        jumps = [0.0 if run.f_max in (0.8, 1.0, 1.2) else 40.0 * (-1) ** k for k, run in enumerate(runs)]
+        return [replace(o, load=o.load + j) for j, o in zip(jumps, simulate(runs), strict=True)]
+
+    test = measured(rng=np.random.default_rng(2))
+    calm, wild = (found(test, ["load_gain"], simulator).emulator for simulator in (simulate, jumping))
+    mask = test.mask
+    still, moved = (np.sqrt(np.diag(scatter(e, mask))[-13:]) for e in (calm, wild))
+    assert moved == pytest.approx(80 * np.sqrt(2 / 3), rel=0.01)  # two of three nudges differ by 80 N, and the grid
+    assert (still < 20).all()
 
 
 def test_a_baseline_that_cannot_be_simulated_is_no_verdict():

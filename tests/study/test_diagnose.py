@@ -16,6 +16,7 @@ from pipeline.core.specimen import SingleEdgeNotchedBeam
 from pipeline.gap.effects import library
 from pipeline.gap.library import nearest, parse, shipped, written
 from pipeline.store.bundle import read_bundle
+from pipeline.store.fields import read_fields, write_fields
 from pipeline.study.diagnose import diagnose
 from pipeline.study.diagnose_sight import abscissae, clear_of, crack_path, own_path, seen, sides
 from pipeline.study.diagnose_together import folders
@@ -101,6 +102,22 @@ def test_two_bundles_of_one_name_are_told_apart_by_their_folders(bundle, tmp_pat
     assert list(folders([read_bundle(bundle), again])) == ["let-go", "again"]
     with pytest.raises(InputError, match="the same name"):
         folders([again, again])
+
+
+def test_the_order_of_points_in_the_field_file_does_not_matter(bundle, tmp_path):
+    one = seen(read_bundle(bundle))
+    turned = tmp_path / "turned"
+    shutil.copytree(bundle, turned)
+    field = read_fields(bundle / "fields.h5")
+    order = np.random.default_rng(0).permutation(len(field.points))
+    shuffled = DisplacementField(
+        field.points[order], field.displacement[:, order], field.valid[:, order], field.std[:, order], field.abscissa
+    )
+    write_fields(turned / "fields.h5", shuffled)
+    two = seen(read_bundle(turned))
+    assert np.array_equal(one.observation.sight.points, two.observation.sight.points)
+    assert np.array_equal(one.observation.reading.field, two.observation.reading.field, equal_nan=True)
+    assert np.allclose(one.path, two.path, atol=1e-6)  # sums in another order
 
 
 def test_a_bundle_without_anything_measured_is_refused(bundle, tmp_path):
