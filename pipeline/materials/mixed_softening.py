@@ -35,7 +35,8 @@ class MixedState:
     Parameters
     ----------
     progress : (m,) array; D with secant unloading, the way s along the branch with elastic
-    plastic : (m, 2) array, m; opening and sliding of unloaded bonds; once failed, the place from which friction counts
+    plastic : (m, 2) array, m; opening and sliding of unloaded bonds; once failed, where there is friction, the stretch
+        of its spring and the place from which it counts
     used : (m,) array, J; energy used up by damage and friction
     """
 
@@ -245,19 +246,23 @@ class MixedSoftening:
         )
 
     def _rubbed(self, before: MixedState, after: MixedState, opening: np.ndarray, sliding: np.ndarray) -> MixedState:
-        """Failed bonds: friction counts from where they failed, slides at its limit, and is forgotten when open."""
+        """Failed bonds: friction counts from where they failed, slides at its limit, and is forgotten when open.
+
+        What its spring held when the bond was last closed is lost when it opens, and nothing while it stays open.
+        """
         failed = after.progress >= self.last
         if not self.friction or not np.any(failed):
             return after
         old = before.progress >= self.last
         place = np.where(failed & ~old, sliding, after.plastic[:, 1])
+        stretch = np.where(old, before.plastic[:, 0], 0.0)
         limit = self.friction * self.k_n * np.maximum(-opening, 0.0)
         shear = self.k_s * (sliding - place)
         slips = failed & (np.abs(shear) > limit)
         to = np.where(slips, sliding - np.copysign(limit, shear) / self.k_s, place)
-        lost = np.where(slips, 0.5 * (np.abs(shear) - limit) * (np.abs(shear) + limit) / self.k_s, 0.0)
-        lost = np.where(slips & (limit > 0), limit * np.abs(to - place), lost)
-        return replace(after, plastic=np.column_stack([after.plastic[:, 0], to]), used=after.used + lost)
+        lost = np.where(limit > 0, limit * np.abs(to - place), 0.5 * self.k_s * stretch**2)
+        kept = np.where(failed, sliding - to, after.plastic[:, 0])
+        return replace(after, plastic=np.column_stack([kept, to]), used=after.used + np.where(failed, lost, 0.0))
 
 
 def _refuse_shear(law: MixedSoftening) -> None:

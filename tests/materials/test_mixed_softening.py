@@ -129,6 +129,19 @@ def test_failed_bonds_rub_when_closed(unloading: Unloading) -> None:
     assert energies[6, 1] == pytest.approx(expected[-1] + stored_last, rel=1e-10), "opening lets the spring go"
 
 
+@pytest.mark.parametrize("unloading", Unloading)
+def test_failed_bonds_that_stay_open_slide_at_no_cost(unloading: Unloading) -> None:
+    law = bond(unloading=unloading, friction=0.5)
+    path = np.array(
+        [[9e-6, 0], [1e-6, 3e-6], [1e-6, -5e-6], [-1e-7, -5e-6], [-1e-7, -5.1e-6], [2e-7, -5e-6], [0, 4e-6]]
+    )
+    forces, _, energies = follow(law, path)
+    assert forces[:, 1] == pytest.approx([0, 0, 0, 0, -10, 0, 0], abs=1e-10)  # K^s × 1e-7 = 10 N; round-off
+    spring = 0.5 * 10**2 / KS
+    expected = 0.5 * FN * DN + np.array([0, 0, 0, 0, 0, spring, spring])
+    assert energies[:, 1] == pytest.approx(expected, rel=1e-10)  # round-off
+
+
 def test_without_friction_failed_bonds_slide_freely() -> None:
     forces, _, _ = follow(bond(), np.array([[9e-6, 0], [-1e-7, 0], [-1e-7, 1e-6]]))
     assert forces[-1] == pytest.approx([-40, 0])

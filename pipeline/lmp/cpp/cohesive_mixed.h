@@ -9,7 +9,8 @@
 
 namespace cohesive {
 
-// D with secant unloading, the way s with elastic; plastic opening and sliding; energy used up
+// D with secant unloading, the way s with elastic; plastic opening and sliding, once failed the stretch of the spring
+// of friction and the place from which it counts; energy used up
 struct MixedState {
   double progress, opening, sliding, used;
 };
@@ -75,17 +76,21 @@ inline void yield_by(const Law &law, MixedState &state, const Mode &mode)
   state.progress = after;
 }
 
-// friction of a failed bond counts from where it failed, slides at its limit, and is forgotten when open
+// friction of a failed bond counts from where it failed, slides at its limit, and is forgotten when open: what its
+// spring, whose stretch is kept, held when the bond was last closed is lost then
 inline void rub(const Law &law, MixedState &state, bool just_failed, double opening, double sliding)
 {
-  if (just_failed) state.sliding = sliding;
+  if (just_failed) {
+    state.sliding = sliding;
+    state.opening = 0.0;
+  }
   const double limit = law.friction * law.k_n * std::fmax(-opening, 0.0);
   const double shear = law.k_s * (sliding - state.sliding);
-  if (!(std::fabs(shear) > limit)) return;
-  const double to = sliding - std::copysign(limit, shear) / law.k_s;
-  state.used += limit > 0.0 ? limit * std::fabs(to - state.sliding)
-                            : 0.5 * (std::fabs(shear) - limit) * (std::fabs(shear) + limit) / law.k_s;
+  const bool slips = std::fabs(shear) > limit;
+  const double to = slips ? sliding - std::copysign(limit, shear) / law.k_s : state.sliding;
+  state.used += limit > 0.0 ? limit * std::fabs(to - state.sliding) : 0.5 * law.k_s * state.opening * state.opening;
   state.sliding = to;
+  state.opening = sliding - to;
 }
 
 inline void advance(const Law &law, MixedState &state, double opening, double sliding)
