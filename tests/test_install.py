@@ -165,7 +165,7 @@ def test_the_installed_package_is_complete(installed):
         assert path.relative_to(ROOT) in places or Path("pipeline") / path.relative_to(ROOT) in places, path
     decks = {path.name for path in (ROOT / "lammps_inputs").iterdir()}
     assert {entry.name for entry in (files("pipeline") / "lammps_inputs").iterdir()} >= decks
-    for part in ("lmp/cohesiveplugin.so", "dic/libcorrelate.so"):
+    for part in ("lmp/cohesiveplugin.so", "dic/libcorrelate.so", "equilibrium/libcholesky.so"):
         assert files("pipeline").joinpath(part).is_file(), part
 
 

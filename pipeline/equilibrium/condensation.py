@@ -11,17 +11,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg, sparse
+from scipy.linalg.blas import dsymv
 from scipy.sparse.linalg import SuperLU, splu
 
 from pipeline.equilibrium.assembly import Assembly, assembly
+from pipeline.equilibrium.cholesky import Plan, available
 from pipeline.equilibrium.factor import Solve, factorise, rough_solve
+from pipeline.equilibrium.far import FarField, exact_solve
 from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.memory import CentralMemory
 
-BATCH = 64  # right-hand sides at a time
+ROUND_OFF = 1e-9  # of K^n: below, a bond counts as elastic in the stiffness that steps are measured by
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class CondensedNetwork:
     support : (b + 1, b + 1) array, N/m, over these and the machine displacement
     islands : Islands
     assembly : Assembly of the strip's bonds and the support
+    plan : Plan of their factorisation; None where the compiled library is missing
     """
 
     bonds: SmallNetwork
@@ -42,6 +46,7 @@ class CondensedNetwork:
     support: np.ndarray
     islands: Islands
     assembly: Assembly
+    plan: Plan | None
 
     @property
     def kept(self) -> int:
@@ -55,7 +60,7 @@ class CondensedNetwork:
         strip, moved = self.bonds.drive.size, self._moved(free, machine)
         internal, load = self.bonds.pull(force[:strip], free[: self.kept], machine)
         carried, own = self.islands.pull(force[strip:], moved, free[self.kept :])
-        carried += self.support @ moved
+        carried += dsymv(1.0, self.support.T, moved)
         internal[self.edge] += carried[:-1]
         return np.append(internal, own), load + float(carried[-1])
 
@@ -66,7 +71,7 @@ class CondensedNetwork:
 
     def measure(self, weight: np.ndarray, free: np.ndarray, machine: float) -> Solve:
         inner, apart = self._blocks(weight)
-        strip = rough_solve(inner, ordered=True)
+        strip = self.plan.factor(inner, single=True).solve if self.plan else rough_solve(inner, ordered=True)
         if not apart.size:
             return strip
         factor = linalg.cho_factor(apart.astype(np.float32), lower=True, overwrite_a=True, check_finite=False)
@@ -80,10 +85,11 @@ class CondensedNetwork:
     def _blocks(self, weight: np.ndarray) -> tuple[sparse.csc_array, np.ndarray]:
         """Stiffnesses of the strip and of the islands, N/m, for bonds of `weight` (m,), N/m."""
         strip, islands = self.bonds.drive.size, self.islands
-        soft = weight[strip:] - islands.k_n
-        row = islands.row[:, :-1]
-        inner = self.assembly.stiffness(weight[:strip], self.support[:-1, :-1] + row.T @ (soft[:, None] * row))
-        return inner, islands.inverse + np.diag(soft)
+        lost = np.maximum(islands.k_n - weight[strip:], 0.0)
+        changed = lost > ROUND_OFF * islands.k_n
+        row = np.sqrt(lost[changed, None]) * islands.row[changed, :-1]
+        inner = self.assembly.stiffness(weight[:strip], self.support[:-1, :-1] - row.T @ row)
+        return inner, islands.inverse - np.diag(lost)
 
     def energy(self, free: np.ndarray, machine: float) -> float:
         moved = self._moved(free, machine)
@@ -92,28 +98,6 @@ class CondensedNetwork:
     def _moved(self, free: np.ndarray, machine: float) -> np.ndarray:
         """Edge and machine (b + 1,), m."""
         return np.append(free[self.edge], machine)
-
-
-@dataclass(frozen=True)
-class FarField:
-    """The eliminated variables: K_ff q_f + K_fk q_k + K_fs s = J_ofᵀ q.
-
-    Parameters
-    ----------
-    inner : (f,) int array; eliminated variables, numbered in the whole model
-    factor : SuperLU of K_ff
-    coupling : (f, k) sparse array K_fk, and drive (f,) array K_fs, N/m
-    """
-
-    inner: np.ndarray
-    factor: SuperLU
-    coupling: sparse.csr_array
-    drive: np.ndarray
-
-    def follow(self, kept: np.ndarray, machine: float, islands: Islands, extra: np.ndarray) -> np.ndarray:
-        """Eliminated variables (f,), m."""
-        pushed = islands.jacobian.T @ islands.tension_lost(extra)
-        return self.factor.solve(pushed - self.coupling @ kept - machine * self.drive)
 
 
 @dataclass(frozen=True)
@@ -176,6 +160,17 @@ class CondensedModel:
         _, law = _divisible(self.whole)
         return replace(state, free=free, memory=CentralMemory(law, opening, reached))
 
+    def carry(self, state: State, grown: CondensedModel) -> State:
+        """A state of this model in the variables of one grown from it; its new bonds are elastic until now."""
+        before, after = self.network.islands, grown.network.islands
+        lost = before.tension_lost(state.free[self.kept.size :])
+        extra = after.compliance[before.count :, : before.count] @ lost
+        moved = np.append(state.free[self.network.edge], state.machine)
+        opening = after.row[before.count :] @ moved + extra
+        reached = np.append(state.memory.reached, np.maximum(opening, 0.0))
+        memory = CentralMemory(grown.law, np.append(state.memory.opening, opening), reached)
+        return replace(state, free=np.append(state.free, extra), memory=memory)
+
     def usage(self, state: State) -> np.ndarray:
         """Opening of every far bond (m,) as a share of its δ_peak in a state of this model; 0 for active bonds."""
         opening = self.whole.network.opening(self.complete(state.free, state.machine), state.machine)
@@ -189,7 +184,7 @@ class CondensedModel:
         (whole, law), far, edge = _divisible(self.whole), self.far, self.network.edge
         jacobian = whole.jacobian[index].tocsr()
         inner = jacobian[:, far.inner].tocsr()
-        columns = _solutions(far.factor, inner.T.tocsc())
+        columns = far.columns(inner.T.tocsc())
         across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsr()
         direct = np.column_stack([jacobian[:, self.kept[edge]].toarray(), whole.drive[index]])
         row = direct - (across.T @ columns).T
@@ -208,19 +203,22 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     pull, load = rigid.pull(law.k_n[~active] * rigid.drive, whole.gauge, 0.0)
     kept = kept[_order(network, active, kept, stiffness)]
     inside = stiffness[inner][:, inner].tocsc()
-    far = FarField(inner, factorise(inside), stiffness[inner][:, kept].tocsr(), pull[inner])
+    factor = factorise(inside)
+    far = FarField(inner, exact_solve(inside, factor), stiffness[inner][:, kept].tocsr(), pull[inner])
     edge = np.flatnonzero(np.diff(stiffness[kept].indptr))
     held = kept[edge]
     outer = sparse.block_array([[stiffness[held][:, held], pull[held, None]], [pull[None, held], [[load]]]]).tocsc()
     across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsc()
-    support = schur_complement(inside, across, outer, far.factor)
+    support = schur_complement(inside, across, outer, factor)
     bonds = network.part(active, kept)
     islands = no_islands(edge.size, inner.size)
+    frame = assembly(bonds.jacobian, edge)
+    plan = Plan(frame.stiffness(np.ones(bonds.drive.size), support[:-1, :-1])) if available() else None
     return CondensedModel(
         whole=whole,
         strip=active,
         kept=kept,
-        network=CondensedNetwork(bonds, edge, support, islands, assembly(bonds.jacobian, edge)),
+        network=CondensedNetwork(bonds, edge, support, islands, frame, plan),
         law=law.of(active),
         gauge=whole.gauge[kept],
         gauge_drive=whole.gauge_drive,
@@ -241,12 +239,6 @@ def _divide(network: SmallNetwork, active: np.ndarray, gauge: np.ndarray) -> tup
     needed = gauge != 0
     needed[network.jacobian[active].indices] = True
     return np.flatnonzero(needed), np.flatnonzero(~needed)
-
-
-def _solutions(factor: SuperLU, right: sparse.csc_array) -> np.ndarray:
-    """K⁻¹ B (f, k) of sparse right-hand sides, some at a time."""
-    parts = [factor.solve(right[:, k : k + BATCH].toarray()) for k in range(0, right.shape[1], BATCH)]
-    return np.hstack(parts)
 
 
 def schur_complement(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg.blas import daxpy
 
 MEMORY = 12  # pairs of steps kept; physics of softening bonds gains nothing beyond
 
@@ -61,10 +62,10 @@ class _Curvature:
         v, shares = gradient.copy(), []
         for step, change, scale in reversed(self.pairs):
             shares.append(scale * (step @ v))
-            v -= shares[-1] * change
+            v = daxpy(change, v, a=-shares[-1])
         v = self.solve(v)
         for (step, change, scale), share in zip(self.pairs, reversed(shares), strict=True):
-            v += step * (share - scale * (change @ v))
+            v = daxpy(step, v, a=share - scale * (change @ v))
         if v @ gradient > 0:
             return -v
         self.pairs.clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -163,8 +164,10 @@ class _Journey:
         return state if isinstance(self.model, WholeModel) else self.model.expand(state)
 
     def _adopt(self, model: CondensedModel) -> None:
-        """Go on with another model of the same specimen."""
-        self.before, self.state = (model.reduce(self._expanded(s)) for s in (self.before, self.state))
+        """Go on with another model of the same specimen: the first condensed one, or one grown from that in use."""
+        now = self.model
+        carry = model.reduce if isinstance(now, WholeModel) else partial(now.carry, grown=model)
+        self.before, self.state = carry(self.before), carry(self.state)
         self.model = model
         self.path.stepper = self.path.stepper.on(model)
 

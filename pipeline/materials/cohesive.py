@@ -90,6 +90,11 @@ class CentralSoftening:
         left = np.where(softened, self.f_max, 0.0) * self.softening.left(self.way(reached))
         return np.where(softened, left, self.k_n * np.maximum(reached, 0.0))
 
+    def falling(self, opening: np.ndarray, bonds: np.ndarray) -> np.ndarray:
+        """Force (k,), N, of some bonds (k,) that are opened beyond their δ_peak and farther than ever before."""
+        peak = self.delta_peak[bonds]
+        return self.f_max[bonds] * self.softening.left((opening - peak) / (self.delta_max[bonds] - peak))
+
     def secant(self, reached: np.ndarray) -> np.ndarray:
         """Force over opening (m,), N/m, at the largest opening `reached` (m,), m; K^n before the peak."""
         softened = reached > self.delta_peak

@@ -6,7 +6,7 @@ What happened before the step, and how long it takes, is known. A *deformation* 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -36,21 +36,36 @@ class Trial(Protocol):
 
 @dataclass(frozen=True)
 class CentralTrial:
-    """Bonds that only open; `reached` (m,), m, before the step."""
+    """Bonds that only open; `reached` (m,), m, before the step.
+
+    Few are on their falling branch: up to `limit` (m,), m, a bond that unloads by its secant has the stiffness
+    `slope` (m,), N/m, and the law itself is asked only beyond.
+    """
 
     law: CentralSoftening
     reached: np.ndarray
+    limit: np.ndarray = field(init=False, repr=False)
+    slope: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", np.maximum(self.reached, self.law.delta_peak))
+        object.__setattr__(self, "slope", self.law.secant(self.reached))
 
     @property
     def elastic(self) -> np.ndarray:
         return self.law.k_n
 
     def force(self, deformation: np.ndarray) -> np.ndarray:
-        return self.law.force(deformation, self.reached)
+        if self.law.unloading is Unloading.ELASTIC:
+            return self.law.force(deformation, self.reached)
+        force = deformation * np.where(deformation > 0, self.slope, self.law.k_n)
+        beyond = np.flatnonzero(deformation > self.limit)
+        force[beyond] = self.law.falling(deformation[beyond], beyond)
+        return force
 
     def secant(self, deformation: np.ndarray) -> np.ndarray:
         at = np.where(deformation > 0, deformation, 1.0)
-        force = self.law.force(at, self.reached)
+        force = self.force(at)
         secant = np.where(deformation > 0, force / at, self.law.k_n)
         if self.law.unloading is Unloading.ELASTIC:
             return np.where((deformation > 0) & (deformation < self.reached) & (force > 0), self.law.k_n, secant)

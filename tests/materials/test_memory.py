@@ -13,7 +13,8 @@ from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.materials.memory import Memory, at_rest
 from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.materials.relaxation import Arms
-from pipeline.materials.softening import LINEAR, Unloading
+from pipeline.materials.softening import LINEAR, Shape, Softening, Unloading
+from pipeline.materials.trial import CentralTrial
 
 PEAK = 2e-7  # m
 END = 60 * PEAK
@@ -51,6 +52,19 @@ def test_trial_forces_are_those_of_the_settled_bonds(name: str, unloading: Unloa
         assert np.all(trial.secant(at) >= 0)
         assert np.all(trial.secant(at) <= 4e8 * (1 + 1e-9))  # K(0): what is stiffer would stall the minimiser
         memory = after
+
+
+@pytest.mark.parametrize("unloading", list(Unloading))
+@pytest.mark.parametrize("shape", list(Shape))
+@given(reached=st.floats(0, 70), opening=st.floats(-2, 250))
+def test_central_trials_ask_the_law_only_where_it_falls(
+    shape: Shape, unloading: Unloading, reached: float, opening: float
+) -> None:
+    f_max = np.array([80, np.inf])  # the second takes no damage
+    law = CentralSoftening(4e8 * np.ones(2), f_max, END * np.ones(2), Softening(shape), unloading)
+    seen, at = PEAK * reached * np.ones(2), PEAK * opening * np.ones(2)
+    force = CentralTrial(law, seen).force(at)
+    assert force == pytest.approx(law.force(at, seen), rel=1e-9, abs=1e-10)  # round-off of 80 N
 
 
 def test_the_first_step_measures_by_the_elastic_stiffness() -> None:

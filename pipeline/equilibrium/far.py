@@ -1,0 +1,62 @@
+"""What stays elastic around the strip: eliminated variables that follow the kept ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU
+
+from pipeline.equilibrium.cholesky import Plan, available
+from pipeline.equilibrium.factor import Solve
+from pipeline.equilibrium.islands import Islands
+
+BATCH = 64  # right-hand sides at a time
+
+
+@dataclass(frozen=True)
+class FarField:
+    """The eliminated variables: K_ff q_f + K_fk q_k + K_fs s = J_ofᵀ q.
+
+    Parameters
+    ----------
+    inner : (f,) int array; eliminated variables, numbered in the whole model
+    solve : function; K_ff⁻¹ b of right-hand sides (f,) or (f, k), N
+    coupling : (f, k) sparse array K_fk, and drive (f,) array K_fs, N/m
+    """
+
+    inner: np.ndarray
+    solve: Solve
+    coupling: sparse.csr_array
+    drive: np.ndarray
+
+    def follow(self, kept: np.ndarray, machine: float, islands: Islands, extra: np.ndarray) -> np.ndarray:
+        """Eliminated variables (f,), m."""
+        pushed = islands.jacobian.T @ islands.tension_lost(extra)
+        return self.solve(pushed - self.coupling @ kept - machine * self.drive)
+
+    def columns(self, right: sparse.csc_array) -> np.ndarray:
+        """K_ff⁻¹ B (f, k) of sparse right-hand sides, some at a time."""
+        parts = [self.solve(right[:, k : k + BATCH].toarray()) for k in range(0, right.shape[1], BATCH)]
+        return np.hstack(parts)
+
+
+def exact_solve(stiffness: sparse.csc_array, factor: SuperLU) -> Solve:
+    """Solutions (q,) or (q, k) with a factorised matrix, by the compiled library where it was built."""
+    if not available():
+        return factor.solve
+    order = np.argsort(factor.perm_c)
+    ordered = stiffness[order][:, order]
+    ordered = (0.5 * (ordered + ordered.T)).tocsc()  # what cancels may be stored in one half only
+    ordered.sort_indices()
+    faster = Plan(ordered).factor(ordered, single=False)
+    if faster.raised:  # not positive definite: pivots of any sign do better
+        return factor.solve
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        found = np.empty(right.shape)
+        found[order] = faster.solve(right[order])
+        return found
+
+    return solve
