@@ -29,6 +29,7 @@ from pipeline.study.specimens import Trial, section_trial
 
 ACCURACIES = (0.1, 0.03, 0.01, 0.003)  # of the runs that show convergence
 JUMPED = 0.05  # by how much loads may differ behind a jump: inertia carries an explicit run over it
+SLIDING = 0.15  # Poisson's ratio at which bonds slide: K^s = 0.4 K^n
 SCALE = 1.25  # of strengths and openings in the check of the scaling law
 
 
@@ -142,9 +143,11 @@ def cross_check(
 
 
 def _specimens(full: bool, seed: int) -> list[Trial]:
+    sliding = section_trial("dct", 1.8, seed, 90.0, SLIDING)
     if not full:
-        return [section_trial("dct", 1.8, seed), section_trial("seb", 1.2, None, 0.0), section_trial("seb", 1.2, seed)]
-    return [
+        first = section_trial("dct", 1.8, seed), section_trial("seb", 1.2, None, 0.0), section_trial("seb", 1.2, seed)
+        return [*first, sliding]
+    return [sliding, section_trial("seb", 0.6, seed, 90.0, SLIDING)] + [
         section_trial(geometry, radius, section, angle)
         for geometry, radius in (("seb", 0.6), ("dct", 1.2))
         for section in (seed, seed + 1, seed + 2, None)

@@ -46,7 +46,9 @@ class Trial:
         return replace(self, problem=replace(self.problem, accuracy=accuracy))
 
 
-def section_trial(geometry: str, radius_mm: float, seed: int | None, angle_deg: float = 90.0) -> Trial:
+def section_trial(
+    geometry: str, radius_mm: float, seed: int | None, angle_deg: float = 90.0, poissons_ratio: float = 0.25
+) -> Trial:
     """A test of a synthetic section with the paper's properties.
 
     Parameters
@@ -55,17 +57,21 @@ def section_trial(geometry: str, radius_mm: float, seed: int | None, angle_deg: 
     radius_mm : float; of the particles
     seed : int, of the section; None: mastic throughout
     angle_deg : float; direction of the close-packed rows against x, 90 along the crack
+    poissons_ratio : float; below 1/4 bonds slide, weaker and further than they open, and particles rotate
     """
     experiment, images = prepare(Request(geometry), geometry, np.random.default_rng(seed or 0))
     turned = experiment.model.model_copy(update={"lattice_angle_deg": angle_deg})
-    experiment = experiment.model_copy(update={"model": turned})
+    sliding = {"shear_strength_ratio": 0.7, "shear_opening_ratio": 1.2} if poissons_ratio < 0.25 else {}
+    material = experiment.material.model_copy(update={"poissons_ratio": poissons_ratio, **sliding})
+    experiment = experiment.model_copy(update={"model": turned, "material": material})
     with tempfile.TemporaryDirectory() as folder:
         write_bundle(Path(folder), experiment, images if seed is not None else Contents())
         bundle = read_bundle(Path(folder))
         model = build_model(bundle, radius_mm * MM)
         problem = model.problem(*start_parameters(bundle), cmod_max=CMOD_MAX[geometry])
     what = "homogeneous" if seed is None else f"section {seed}"
-    return Trial(f"{geometry}, {what}, {radius_mm:g} mm, {angle_deg:g}°", problem, bundle.observation_points)
+    name = f"{geometry}, {what}, {radius_mm:g} mm, {angle_deg:g}°" + (", sliding" if sliding else "")
+    return Trial(name, problem, bundle.observation_points)
 
 
 def bond_in_series(spring: float = 1e9) -> Problem:
