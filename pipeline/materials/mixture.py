@@ -107,7 +107,13 @@ class Mixture:
         force, opening = self.strength(bonds.phase, f_max, delta_max)
         free = ~bonds.protected
         force, opening = np.where(free, force, np.inf), np.where(free, opening, np.inf)
-        stiffness, ratio = self.stiffness(bonds.phase, thickness), self.shear_ratio
+        return self.bond_law(self.stiffness(bonds.phase, thickness), force, opening)
+
+    def bond_law(
+        self, stiffness: np.ndarray, force: np.ndarray, opening: np.ndarray
+    ) -> CentralSoftening | MixedSoftening:
+        """The law of bonds with K^n (m,), N/m, f_max (m,), N, and delta_max (m,), m, on any network; as `law`."""
+        ratio = self.shear_ratio
         if not ratio:
             self._refuse_sliding()
             if self.softening == LINEAR and self.unloading is Unloading.SECANT:

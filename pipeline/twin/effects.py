@@ -17,6 +17,7 @@ from pipeline.core.specimen import Specimen
 from pipeline.core.units import KN, MINUTE, UM
 from pipeline.gap.plan import Place, Plan
 from pipeline.materials.cohesive import CentralSoftening
+from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.twin.problem import PhaseAt
 
@@ -59,12 +60,7 @@ def with_effects(problem: Problem, plan: Plan) -> Problem:
     law: Any = problem.law
     place = Place(problem.particles.position[problem.bonds.pairs].mean(axis=1), problem.bonds.phase, plan.specimen)
     factors = plan.factors(place)
-    law = replace(
-        law,
-        k_n=law.k_n * factors.stiffness,
-        f_max=law.f_max * factors.strength,
-        delta_max=law.delta_max * factors.opening,
-    )
+    law = law.times(factors.stiffness, factors.strength, factors.opening)
     if plan.spent:
         law = _hurt(law, np.hypot(*(place.middle - plan.specimen.tip).T) <= plan.spent_radius, plan.spent)
     grips = problem.grips
@@ -87,8 +83,12 @@ def _leaning(name: str, friction: float) -> np.ndarray:
     return np.array([np.sin(turn), np.cos(turn)])
 
 
-def _hurt(law: CentralSoftening, near: np.ndarray, spent: float) -> CentralSoftening:
+def _hurt(law: CentralSoftening | MixedSoftening, near: np.ndarray, spent: float) -> CentralSoftening:
     """Bonds that have walked a part of their straight softening branch."""
+    if isinstance(law, MixedSoftening):
+        raise UnavailableError(
+            "damage at the tip of bonds that carry shear is not in this version: set poissons_ratio to its limit"
+        )
     if law.softening.left(np.array([0.5]))[0] != 0.5:
         raise UnavailableError("damage at the tip together with another softening shape is not in this version")
     k_n, f_max = law.k_n.copy(), law.f_max.copy()

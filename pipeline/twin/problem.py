@@ -10,9 +10,7 @@ import numpy as np
 from pipeline.core.particles import Bonds, Particles, Phase
 from pipeline.core.problem import Kinematics, Problem
 from pipeline.core.specimen import Specimen
-from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
 from pipeline.materials.mixture import Mixture
-from pipeline.materials.softening import LINEAR
 from pipeline.microstructure.attachment import attach_gauge, attach_grips
 from pipeline.microstructure.rigid_body import main_part, rigid_part
 from pipeline.twin.network import IrregularNetwork
@@ -79,8 +77,7 @@ def twin_problem(
     facet = network.facet[kept] / (2 * truth.radius / np.sqrt(3))
     stiffness = mixture.stiffness(bonds.phase, specimen.thickness) * network.stiffness[kept]
     free = ~bonds.protected
-    law = _law(
-        mixture,
+    law = mixture.bond_law(
         factors.stiffness * stiffness,
         np.where(free, factors.strength * strength * facet, np.inf),
         np.where(free, factors.opening * opening, np.inf),
@@ -96,12 +93,6 @@ def twin_problem(
         cmod_max=cmod_max,
         stations=np.asarray(stations, float),
     )
-
-
-def _law(mixture: Mixture, k_n: np.ndarray, f_max: np.ndarray, delta_max: np.ndarray) -> CentralSoftening:
-    if mixture.softening == LINEAR:
-        return LinearSoftening(k_n, f_max, delta_max)
-    return CentralSoftening(k_n, f_max, delta_max, mixture.softening)
 
 
 def _lay_phases(
