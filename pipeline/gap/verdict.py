@@ -32,6 +32,7 @@ class Verdict:
 
 def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
     """Say what the data allow to be said."""
+    blind = len(card.names) > 0 and len(card.hidden) == len(card.names)
     if not gate.passed:
         worst = gate.failed[0]
         excess = gate.ratio[worst] / gate.limit[worst]
@@ -42,7 +43,10 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
             "models leave; or the simulation itself fails",
         )
     if scored.probability[NONE] >= HALF:
-        return Verdict(NONE_NEEDED, (), f"the model as it is has probability {scored.probability[NONE]:.2f}")
+        told = f"the model as it is has probability {scored.probability[NONE]:.2f}"
+        return Verdict(
+            NONE_NEEDED, (), f"{told}, but these data show no effect of any plausible size" if blind else told
+        )
     top = next(label for label in scored.ranked() if label != NONE)
     names = tuple(top.split(" + "))
     mates = tuple(dict.fromkeys(m for n in names for m in card.class_of(n)))

@@ -21,7 +21,7 @@ COLOURS = (ORANGE, BLUE, GREEN, VERMILION)  # the model as it is, the first expl
 def where_map(axes: Axes, cells: Sequence[Mapping[str, Any]], stage: str, against: str = "z_gap") -> Axes:
     """Region × mode of one stage, and the load: how many times what honest engines (or noise alone) would give.
 
-    Below the ratio stands the size itself, in µm, of the load in N.
+    Below the ratio stands the size itself, of displacements in µm.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def where_map(axes: Axes, cells: Sequence[Mapping[str, Any]], stage: str, agains
         dark = cell[against] > np.sqrt(worst) * 1.5
         axes.text(
             (len(columns) - 1) / 2 if of_load else columns.index(cell["mode"]), row,
-            f"{_short(cell[against])}×\n{_short(cell['rms'])} {'N' if of_load else 'µm'}",
+            f"{short(cell[against])}×\n{short(cell['rms'])}{' N' if of_load else ''}",
             ha="center", va="center", fontsize=5.5, color="w" if dark else BLACK, linespacing=1.1,
         )  # fmt: skip
     image = axes.imshow(table, cmap="YlOrRd", norm=LogNorm(1.0, worst), aspect="auto")
@@ -223,7 +223,7 @@ def _mean(values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.divide(total.sum(axis=1), count, out=np.full(len(values), np.nan), where=count > 0))
 
 
-def _short(value: float) -> str:
+def short(value: float) -> str:
     """Two digits, without powers of ten."""
     return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.gap.diagnosis import Diagnosis
-from pipeline.gap.effects import effect
+from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED
 from pipeline.gap.observation import STAGES
 from pipeline.gap.score import NONE
@@ -20,6 +20,7 @@ from pipeline.report.diagnosis import (
     differences,
     loads,
     ranking,
+    short,
     where_map,
 )
 from pipeline.report.page import Figure, Number, Section, page
@@ -32,6 +33,7 @@ from pipeline.study.pages import picture, write_page
 WIDE = {"width": 190.0, "height": 66.0}  # mm
 CALLED = {NONE: "model as it is"}
 CELLS = 4  # of the table of where, in words
+SPEAKS = 0.5  # log Bayes factor, either way, from which data say something of an effect
 
 
 def diagnosis_page(case: Case, diagnosis: Diagnosis, result: Mapping[str, Any]) -> None:
@@ -61,13 +63,34 @@ def footer(result: Mapping[str, Any]) -> list[str]:
 
 
 def verdict_section(result: Mapping[str, Any], remarks: Any) -> Section:
-    """What is said, how large it is, what it does to the parameters."""
-    named = "; ".join(f"{n}: {effect(n).says}" for n in result["named"])
-    told = f"{result['verdict'].capitalize()}. {named + '. ' if named else ''}{result['reason'].capitalize()}."
+    """What is said, how large it is, what it does to the parameters, what to do about it."""
+    told = [f"{result['verdict'].capitalize()}: {_meant(result)}.", f"{_sentence(result['reason'])}."]
     first = next((label for label in result["closure"] if set(label.split(" + ")) <= set(result["named"])), None)
     if first is not None:
-        told += f" {closed(first, result['closure'][first])}."
-    return Section("The verdict", text=told, numbers=[*_sizes(result), *_parameters(result)], notes=list(remarks))
+        told.append(f"{_sentence(closed(first, result['closure'][first]))}.")
+    if result["named"] and result["separate_by"]:
+        told.append(f"To check: {result['separate_by'][0].partition(': ')[2]}.")
+    hidden = result["cannot_exclude"]
+    if hidden:
+        told.append(f"Whatever is said here, {len(hidden)} effects cannot be excluded by these data (listed below).")
+    return Section(
+        "The verdict", text=" ".join(told), numbers=[*_sizes(result), *_parameters(result)], notes=list(remarks)
+    )
+
+
+def _meant(result: Mapping[str, Any]) -> str:
+    """The verdict in words that need no table."""
+    said = [f"{effect(n).says} ({n})" for n in result["named"]]
+    return {
+        "none needed": "test and model part by no more than honest models part from each other",
+        "outside the library": "test and model part in a way that no known effect explains",
+    }.get(result["verdict"], "; or ".join(said) if result["verdict"] != "cause" else "; and ".join(said))
+
+
+def _sentence(text: str) -> str:
+    """With a capital, unless it begins with the name of an effect."""
+    first = text.split(" ", 1)[0].rstrip(":,")
+    return text if "_" in first or first in library() else text[0].upper() + text[1:]
 
 
 def _sizes(result: Mapping[str, Any]) -> list[Number]:
@@ -95,11 +118,14 @@ def _parameters(result: Mapping[str, Any]) -> list[Number]:
         ("f_max delta_max/(2 r t)", "bond_fracture_energy_j_per_m2", "J/m²"),
     ):
         interval = after.get("interval_95", {}).get(key)
-        spread = f" (95 %: {interval[0]:.4g} to {interval[1]:.4g})" if interval else ""
-        off = bias[key.removesuffix("_n").removesuffix("_m").removesuffix("_j_per_m2")]
-        told = f"{before[key]:.4g} {unit} without the first explanation: {off:+.0%} off{spread}"
+        spread = f"95 %: {interval[0]:.4g} to {interval[1]:.4g}; " if interval else ""
+        told = f"{spread}{before[key]:.4g} {unit} ({bias[_bare(key)]:+.0%}) where nothing is added to the model"
         rows.append(Number(name, f"{after[key]:.4g} {unit}", told))
     return rows
+
+
+def _bare(key: str) -> str:
+    return key.removesuffix("_n").removesuffix("_m").removesuffix("_j_per_m2")
 
 
 def closed(label: str, c: Mapping[str, Any]) -> str:
@@ -121,12 +147,13 @@ def _where(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
 
 def where_told(cells: list[dict[str, Any]]) -> str:
     """The cells that stand out most, in words."""
-    told = [
-        f"{c['channel']}, {c['stage']}" + (f", {c['region']}, {c['mode']}" if c["channel"] == "field" else "")
-        + f": {c['rms']:.2g} {'N' if c['channel'] == 'load' else 'µm'}, {c['z_gap']:.2g} times what complete models "
-        f"leave, {c['z_noise']:.2g} times noise"
-        for c in cells[:CELLS]
-    ]  # fmt: skip
+    told = []
+    for c in cells[:CELLS]:
+        place = [c["channel"], c["stage"], *([c["region"], c["mode"]] if c["channel"] == "field" else [])]
+        told.append(
+            f"{', '.join(place)}: {short(c['rms'])} {'N' if c['channel'] == 'load' else 'µm'}, {short(c['z_gap'])} "
+            f"times what complete models leave, {short(c['z_noise'])} times noise"
+        )
     return "After the refit of f_max and delta_max, the model as it is leaves most in " + "; ".join(told) + "."
 
 
@@ -137,7 +164,10 @@ def where_figures(folder: Path, cells: list[dict[str, Any]]) -> list[Figure]:
         panels = [_panel(cells, stage, against) for stage in STAGES]
         data = png(*panels, columns=3, **WIDE)
         write_atomically(folder / f"where_{against}.png", data)
-        told = f"Model as it is: difference, and how many times larger it is than {words} would give (1 is expected)."
+        told = (
+            f"Model as it is: how many times larger the difference is than {words} would give (1 is expected); below "
+            "it the difference itself, root mean square in µm (load: N)."
+        )
         figures.append(Figure(data, told, wide=True))
     return figures
 
@@ -180,15 +210,26 @@ def _which(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
     return Section("Which effect", numbers=likely(result), figures=[figure], notes=alike(result))
 
 
+def speaking(result: Mapping[str, Any]) -> list[str]:
+    """Explanations of the 90 % set of which the data say something, either way: others keep their prior."""
+    return [n for n in result["set_90"] if n == NONE or abs(result["log_bayes"][n]) >= SPEAKS]
+
+
 def likely(result: Mapping[str, Any]) -> list[Number]:
     """The explanations that hold 90 % of the probability, with their sizes."""
-    rows = []
-    for label in result["set_90"]:
-        sizes = []
-        for name in label.split(" + ") if label != NONE else ():
-            found = result["estimate"][name]
-            sizes.append(f"{effect(name).says} ({amount(found['value'], found['unit'])} if it is the only one)")
-        rows.append(Number(CALLED.get(label, label), f"{result['probability'][label]:.2f}", "; ".join(sizes)))
+    rows, said = [], speaking(result)
+    for label in said:
+        names = label.split(" + ") if label != NONE else []
+        sizes = [effect(name).says for name in names]
+        if len(names) == 1:
+            found = result["estimate"][names[0]]
+            sizes = [f"{sizes[0]}: {amount(found['value'], found['unit'])}"]
+        told = [] if label == NONE else [f"log Bayes factor {result['log_bayes'][label]:.1f}"]
+        rows.append(Number(CALLED.get(label, label), f"{result['probability'][label]:.2f}", "; ".join([*sizes, *told])))
+    rest = [n for n in result["set_90"] if n not in said]
+    if rest:
+        share = sum(result["probability"][n] for n in rest)
+        rows.append(Number(f"{len(rest)} others", f"{share:.2f}", "of which the data say nothing, for or against"))
     return rows
 
 
@@ -264,7 +305,7 @@ def unseen_section(folder: Path, result: Mapping[str, Any]) -> Section:
 
 def next_section(result: Mapping[str, Any]) -> Section:
     """What to measure: first what tells the likely explanations apart, then what cannot be seen."""
-    likely_ = {n for label in result["set_90"] for n in label.split(" + ")} | set(result["named"])
+    likely_ = {n for label in speaking(result) for n in label.split(" + ")} | set(result["named"])
     first = [s for s in result["separate_by"] if s.split(":")[0] in likely_]
     rest = [s for s in result["separate_by"] if s not in first]
     told = "" if not first else "To confirm or to tell apart: " + "; ".join(first) + "."

@@ -55,15 +55,27 @@ def diagnosis_result(
         "noise_bic": dict(d.noise_bic),
         "separate_by": remedies(d.scored, d.card, d.verdict, d.untested),
         "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
-        "warnings": warnings + ([_edge()] if d.fits[NONE].at_edge else []),
+        "warnings": [*warnings, *own_warnings(d.card, d.fits[NONE].at_edge)],
         "remarks": list(look.remarks),
         "simulations": d.runs,
         "data": int(d.data.target.size),
     }
 
 
-def _edge() -> str:
-    return "the fit of the model as it is lies on the edge of the grid: an effect pulls it there, or [start] is far off"
+def own_warnings(card: Card, at_edge: bool) -> list[str]:
+    """What a reader must know before the verdict; `at_edge`: of the model as it is."""
+    found = []
+    if at_edge:
+        found.append(
+            "the fit of the model as it is lies on the edge of the grid: an effect pulls it there, or [start] is far "
+            "off"
+        )
+    if len(card.hidden) == len(card.names):
+        found.append(
+            "no effect of the library would show in these data at any plausible size: `none needed` then says nothing "
+            "of the model, and its parameters are as uncertain as their intervals say"
+        )
+    return found
 
 
 def _single(d: Diagnosis) -> list[str]:

@@ -24,6 +24,7 @@ from pipeline.study.diagnose_result import (
     excluded_not,
     finite,
     gate_result,
+    own_warnings,
     remedies,
 )
 from pipeline.study.output import joined
@@ -77,7 +78,7 @@ def together_result(cases: Mapping[str, Case], joint: Together) -> dict[str, Any
         "noise_bic": _summed([d.noise_bic for d in diagnoses]),
         "separate_by": remedies(j.scored, j.card, j.verdict, j.untested),
         "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
-        "warnings": warnings_together(cases),
+        "warnings": [*warnings_together(cases), *own_warnings(j.card, False)],
         "remarks": remarks_together(cases),
         "simulations": sum(d.runs for d in diagnoses),
         "data": int(sum(d.data.target.size for d in diagnoses)),

@@ -165,6 +165,14 @@ def test_verdicts(bayes, classes, gate, kind, named):
     assert (found.kind, set(found.named)) == (kind, set(named))
 
 
+def test_data_that_show_nothing_are_not_praised():
+    flat = from_bayes({NONE: 0.0, **dict.fromkeys(names(3), 0.0)}, {NONE: 0, **dict.fromkeys(names(3), 1)}, 3)
+    n = len(names(3))
+    blind = Card(tuple(names(3)), np.full(n, np.inf), np.full(n, 0.5), np.ones(n), np.zeros((n, n)), ())
+    assert "show no effect" in verdict(flat, blind, OPEN).reason
+    assert "show no effect" not in verdict(flat, cards(), OPEN).reason
+
+
 def test_the_verdict_does_not_hang_on_names():
     """The same data under permuted names: the same probabilities, permuted."""
     base, columns = library()
