@@ -97,6 +97,11 @@ class RunSettings(BaseModel):
         description="one simulation for all nodes of equal delta_max/f_max, by the scaling law of small kinematics; "
         "damage in the aggregate is looked for, nodes that have some are simulated by themselves",
     )
+    ratio_count: Annotated[int, Field(ge=4, le=50)] | None = Field(
+        default=None,
+        description="simulations for the whole grid, one a ratio delta_max/f_max; nodes are interpolated between them, "
+        "and the report says how far that errs; absent: every node is simulated",
+    )
     modulus_std: Annotated[float, Field(ge=0, le=0.5)] = Field(
         default=0.05,
         description="standard deviation of the mastic modulus, relative; carried into the interval of f_max",

@@ -27,6 +27,7 @@ from pipeline.store.problem_key import problem_key
 from pipeline.store.results import prepare_output
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
+from pipeline.study.agreement import curve_difference, field_difference
 from pipeline.study.assembly import CREEPING, Model, build_model
 from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
@@ -37,6 +38,7 @@ from pipeline.study.levelling import Leveller, leveller, refuse_unlevelled
 from pipeline.study.observation import at_stations, measured_test, observe_solution
 from pipeline.study.output import results_folder
 from pipeline.study.prospects import refuse_hopeless, refuse_inert
+from pipeline.study.ratios import Between, between
 from pipeline.study.scaling import leading_problem, member_solution, scaling_groups
 
 TRIES = 5  # placements looked at for each that is wanted
@@ -56,6 +58,7 @@ class Campaign:
     store : SimulationStore
     progress : Progress
     used : keys of the simulations that took part so far; the store may hold others
+    remarks : what a reader should know of the last grid
     leveller : Leveller, or None: simulations are observed as they are
     executor : Executor, or None: processes of this machine
     """
@@ -68,6 +71,7 @@ class Campaign:
     store: SimulationStore
     progress: Progress
     used: set[str]
+    remarks: list[str]
     leveller: Leveller | None = None
     executor: Executor | None = None
 
@@ -79,6 +83,30 @@ class Campaign:
         """The test at one node of the grid, of a model that differs in placement or material."""
         law = CREEPING if self.settings.viscoelastic else None
         return model.problem(f_max, delta_max, accuracy=self.settings.accuracy, law=law)
+
+    def grid(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
+        """All nodes of a grid, in order: simulated, or interpolated between a few ratios where the settings say so."""
+        count = self.settings.ratio_count
+        if count is None:
+            return self.solutions(nodes)
+        found = between(nodes, count, self.problem, self.solved)
+        lacking = [k for k, (_, solution) in enumerate(found.runs) if solution is None]
+        direct = dict(zip(lacking, self.solutions([nodes[k] for k in lacking]), strict=True))
+        self.remarks[:] = [self._missed(found, len(lacking))]
+        return [direct[k] if solution is None else (p, solution) for k, (p, solution) in enumerate(found.runs)]
+
+    def _missed(self, found: Between, direct: int) -> str:
+        """How far the interpolation in the ratio errs where it was tried."""
+        at = self.measured.cmod
+        load = [curve_difference(guess.curve, true.curve, at[at <= t.cmod_max]) for t, true, guess in found.trials]
+        told = f"{max(load, default=np.nan):.1%} in the load"
+        if self.points.size:
+            pairs = [self.seen([(t, guess), (t, true)]) for t, true, guess in found.trials]
+            told += f" and {max((field_difference(*pair) for pair in pairs), default=np.nan):.1%} in the fields"
+        return (
+            f"nodes were interpolated between {self.settings.ratio_count} ratios delta_max/f_max ({direct} simulated): "
+            f"each simulation left out in turn is missed by {told} at most, over twice the distance"
+        )
 
     def solutions(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
         """Simulate the nodes that the store does not hold; all of them, in order."""
@@ -140,7 +168,9 @@ class Campaign:
         return found
 
     def kept(self, nodes: list[tuple[float, float]]) -> list[tuple[Problem, Solution]]:
-        """The nodes as the store holds them, in order; refuses where one is missing."""
+        """The nodes of a grid as the store holds them, in order; refuses where one is missing."""
+        if self.settings.ratio_count is not None:
+            return self.grid(nodes)
         problems = [self.problem(*node) for node in nodes]
         return [(problem, self._read(problem_key(problem, self.engine.label))) for problem in problems]
 
@@ -183,7 +213,7 @@ def prepare(
     points = np.zeros((0, 2)) if measured.field is None else measured.field.points
     store = SimulationStore(prepare_output(folder / "simulations"))
     level = leveller(read, settings, points, folder, chosen.label) if settings.levelling else None
-    campaign = Campaign(model, measured, points, settings, chosen, store, progress, set(), level, executor)
+    campaign = Campaign(model, measured, points, settings, chosen, store, progress, set(), [], level, executor)
     return campaign, aim, folder
 
 
@@ -269,7 +299,7 @@ def centred(campaign: Campaign, design: Design, aim: Objective, placed: Placemen
 
 def estimate_on(campaign: Campaign, design: Design, aim: Objective, placed: Placements | None = None) -> Estimate:
     """Simulate a grid and estimate on it."""
-    runs = campaign.solutions(design.nodes())
+    runs = campaign.grid(design.nodes())
     stations = campaign.measured.cmod
     loads = [solution.curve.load_at(stations) for _, solution in runs]
     seen = None

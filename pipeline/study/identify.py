@@ -90,7 +90,7 @@ def conclude(
     write_arrays(folder, IDENTIFY, identification_arrays(campaign, found, optimum))
     write_result(folder, result)
     identification_page(folder, campaign.model, campaign.measured, found, problem, optimum, result)
-    return "\n".join([_summary(found, campaign.model.remarks), *widened_lines(more)])
+    return "\n".join([_summary(found, (*campaign.model.remarks, *campaign.remarks)), *widened_lines(more)])
 
 
 def identification_result(
@@ -113,7 +113,7 @@ def identification_result(
         "radius_mm": problem.particles.radius / MM,
         "viscoelastic": campaign.settings.viscoelastic,
         **estimate_result(found, area),
-        "remarks": list(campaign.model.remarks),
+        "remarks": [*campaign.model.remarks, *campaign.remarks],
         "simulations": len(campaign.used),
         **optimum_result(campaign, problem, optimum),
     }

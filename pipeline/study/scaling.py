@@ -11,6 +11,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.problem import BondLaw, EnergyBalance, Kinematics, Problem, Solution
 from pipeline.materials.cohesive import CentralSoftening
 
+FEW = 0.05  # of the softened bonds may be of an aggregate that keeps its strength, where solutions are interpolated
+
 
 def scaled_problem(problem: Problem, factor: float) -> Problem:
     """The problem whose solution is that of `problem`, scaled.
@@ -97,7 +99,13 @@ def member_solution(lead: Solution, leading: Problem, target: Problem, factor: f
     """
     scaled = scaled_problem(leading, factor)
     solution = scaled_solution(lead, leading, factor)
-    if not _untouched(scaled.law, target.law, solution.reached) or solution.curve.cmod[-1] < 0.999 * target.cmod_max:
+    same = _untouched(scaled.law, target.law, solution.reached)
+    return at_stations_of(solution, target) if same else None
+
+
+def at_stations_of(solution: Solution, target: Problem) -> Solution | None:
+    """A solution that was followed farther, with the frames of `target` alone; None where it is too short for it."""
+    if solution.curve.cmod[-1] < 0.999 * target.cmod_max:
         return None
     frames = [int(np.argmin(np.abs(solution.cmod - station))) for station in target.stations]
     if not np.allclose(solution.cmod[frames], target.stations, rtol=1e-6, atol=0):
@@ -105,12 +113,30 @@ def member_solution(lead: Solution, leading: Problem, target: Problem, factor: f
     return replace(solution, cmod=target.stations, displacement=solution.displacement[frames])
 
 
+def neighbour_solution(lead: Solution, leading: Problem, target: Problem, factor: float) -> Solution | None:
+    """As `member_solution`, for a target of the same strengths whose openings are not those of the scaled lead.
+
+    Returns
+    -------
+    Solution of the scaled lead with the frames of `target`; None where it is too short, or where more than `FEW` of
+    the bonds that softened have a strength that does not follow: a few such bonds err little
+    """
+    solution, law = scaled_solution(lead, leading, factor), scaled_problem(leading, factor).law
+    if not (isinstance(law, CentralSoftening) and isinstance(target.law, CentralSoftening)):
+        return None
+    unlike = ~np.isclose(law.f_max, target.law.f_max, rtol=1e-9, atol=0)
+    softened = solution.reached > np.minimum(law.delta_peak, target.law.delta_peak)
+    if np.sum(softened & unlike) > FEW * np.sum(softened):
+        return None
+    return at_stations_of(solution, target)
+
+
 def _scalable(problem: Problem) -> CentralSoftening:
     """The law of a problem whose solutions can be scaled."""
     if problem.kinematics is not Kinematics.SMALL or not isinstance(problem.law, CentralSoftening):
         raise InputError(
             "solutions are scaled only under small kinematics and for bonds that neither creep nor slide: "
-            "leave `scaling` out"
+            "leave `scaling` and `ratio_count` out"
         )
     return problem.law
 
