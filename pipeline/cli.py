@@ -11,12 +11,10 @@ from typing import Annotated
 
 import typer
 
-from pipeline import __version__
 from pipeline.cli_blind_check import blind_check
 from pipeline.cli_cluster import collect, export
 from pipeline.cli_diagnose import diagnose
 from pipeline.cli_library import library
-from pipeline.core.errors import UnavailableError
 from pipeline.options import (
     Accuracy,
     Bundle,
@@ -71,19 +69,6 @@ def common(
     version: Version = False,
 ) -> None:
     """Cohesive fracture properties of asphalt and concrete from images of a fracture test."""
-
-
-def refuse_until_built(**options: object) -> None:
-    """Refuse options whose feature is not part of this version.
-
-    Raises
-    ------
-    UnavailableError
-        naming the options that were given
-    """
-    given = ["--" + name.replace("_", "-") for name, value in options.items() if value]
-    if given:
-        raise UnavailableError(f"not available in version {__version__}: {', '.join(given)}; leave it out")
 
 
 @app.command()
@@ -281,7 +266,9 @@ def virtual_test(
     geometry: Annotated[Geometry | None, option("--geometry", help="Specimen; seb unless --like says other.")] = None,
     specimen: Annotated[Path | None, option("--specimen", metavar="IMAGE", help="Photograph or label image.")] = None,
     like: Annotated[Path | None, option("--like", metavar="BUNDLE", help="Bundle whose test is imitated.")] = None,
-    creep: Annotated[Path | None, option("--creep", metavar="FILE", help="Creep compliance of the mastic.")] = None,
+    creep: Annotated[
+        Path | None, option("--creep", metavar="FILE", help="The mastic creeps as this record says.")
+    ] = None,
     f_max: TrueFMax = None,
     delta_max: TrueDeltaMax = None,
     start: Start = None,
@@ -302,7 +289,6 @@ def virtual_test(
     """Make a bundle with known truth by another kind of model."""
     with exit_codes(debug):
         with Display() as progress:
-            refuse_until_built(creep=creep)
             from pipeline.study.output import virtual_test_folder
             from pipeline.study.virtual_test import virtual_test as make
 
@@ -312,6 +298,7 @@ def virtual_test(
                     geometry=geometry,
                     specimen=specimen,
                     like=like,
+                    creep=creep,
                     f_max=f_max,
                     delta_max=delta_max,
                     start=start,

@@ -145,19 +145,6 @@ def test_wrong_usage_is_exit_2_and_calls_nothing(study, line):
     assert study.args == ()
 
 
-@pytest.mark.parametrize(
-    ("line", "option"),
-    [
-        (COMMANDS["virtual_test"], ["--creep", "creep.csv"]),
-    ],
-)
-def test_what_comes_later_is_refused_by_name(study, line, option):
-    result = run(*line, *option)
-    assert result.exit_code == 1
-    assert result.stderr == f"cohesive-bpm: not available in version {__version__}: {option[0]}; leave it out\n"
-    assert study.args == ()
-
-
 @pytest.mark.parametrize("command", ["simulate", "virtual_test"])
 def test_effects_reach_the_study(study, command):
     assert run(*COMMANDS[command], "--effect", "modulus=0.1", "--effect", "load_gain=-0.02").exit_code == 0
@@ -219,8 +206,9 @@ def test_what_is_left_out_is_left_to_the_settings(study):
 
 def test_a_virtual_test_is_told_its_truth(study):
     line = ["--f-max", "80", "--delta-max", "1e-4", "--start", "71,1.14e-4", "--noise-px", "0", "--mm-per-px", "0.05"]
-    assert run("virtual-test", "O", *line, "--like", "B", "--load-noise-n", "2").exit_code == 0
+    assert run("virtual-test", "O", *line, "--like", "B", "--load-noise-n", "2", "--creep", "c.csv").exit_code == 0
     told = study.options
+    assert told["creep"] == Path("c.csv")
     assert (told["f_max"], told["delta_max"], told["start"]) == (80.0, 1e-4, (71.0, 1.14e-4))
     assert (told["noise_px"], told["mm_per_px"], told["load_noise_n"], told["like"]) == (0.0, 0.05, 2.0, Path("B"))
 

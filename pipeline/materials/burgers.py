@@ -44,6 +44,11 @@ class Burgers:
         """The same as a Kelvin chain."""
         return KelvinChain(self.d1, 1 / self.eta1, np.array([self.d2]), np.array([self.tau2]))
 
+    def like(self, modulus: float, share: float = 1.0) -> Burgers:
+        """Another short-term modulus, Pa, and a share of the growth: D = (1 + share (D(t)/D₁ − 1))/modulus."""
+        growth = share / (modulus * self.d1)
+        return Burgers(1 / modulus, growth * self.d2, self.eta1 / growth, self.tau2)
+
     def creep_compliance(self, time: np.ndarray) -> np.ndarray:
         """D (1/Pa) at times (s) of any shape, not negative."""
         return self.chain.creep_compliance(time)

@@ -25,7 +25,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.problem import Problem
-from pipeline.materials.cohesive import CentralSoftening, refuse_values
+from pipeline.materials.cohesive import CentralSoftening, Factor
 from pipeline.materials.relaxation import Arms, crept, history_force, relax, stored, tangent, total
 from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
@@ -74,20 +74,24 @@ class CreepingSoftening:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unloading", named_unloading(self.unloading))
-        for name in ("f_max", "delta_max"):
-            values = np.array(getattr(self, name), float)
-            if values.shape != self.rise.left.shape:
-                raise InputError(
-                    f"{name} of {values.size} bonds for the arms of {self.rise.left.size}: one each is needed"
-                )
-            object.__setattr__(self, name, values)
-        _refuse_arms(self.rise)
-        refuse_values(self.k_n, self.f_max, self.delta_max)
+        f_max, delta_max = np.asarray(self.f_max, float), np.asarray(self.delta_max, float)
+        _refuse("f_max", f_max, f_max > 0, self.rise)
+        _refuse("delta_max", delta_max, (delta_max > 0) | ~np.isfinite(f_max), self.rise)
 
     def of(self, bonds: np.ndarray) -> CreepingSoftening:
         """The law of some of the bonds: numbers (k,) or bools (m,)."""
         rise = Arms(self.rise.stiffness[bonds], self.rise.time[bonds], self.rise.left[bonds])
         return replace(self, rise=rise, f_max=self.f_max[bonds], delta_max=self.delta_max[bonds])
+
+    def times(self, stiffness: Factor, strength: Factor, opening: Factor) -> CreepingSoftening:
+        """The law with stiffness, strength and last opening of every bond multiplied, each by a number or (m,)."""
+        factor = np.broadcast_to(stiffness, self.rise.left.shape)
+        rise = Arms(factor[:, None] * self.rise.stiffness, self.rise.time, factor * self.rise.left)
+        return replace(self, rise=rise, f_max=strength * self.f_max, delta_max=opening * self.delta_max)
+
+    def spared(self, bonds: np.ndarray) -> CreepingSoftening:
+        """The law with some bonds (m,) bool that take no damage."""
+        return replace(self, f_max=np.where(bonds, np.inf, self.f_max))
 
     def at_rest(self) -> BondState:
         """Bonds that were never loaded."""
@@ -250,16 +254,8 @@ def refuse_timeless(problem: Problem) -> None:
         raise InputError("the problem has a clock, t(CMOD), but no bond creeps: leave it out")
 
 
-def _refuse_arms(rise: Arms) -> None:
-    """Refuse arms that are no springs and dashpots; one of no stiffness is none, whatever its time."""
-    some = rise.stiffness != 0
-    rules = (
-        ("stiffness", "N/m", rise.stiffness, np.isfinite(rise.stiffness) & (rise.stiffness >= 0), "zero or positive"),
-        ("time", "s", rise.time, ~some | (np.isfinite(rise.time) & (rise.time > 0)), "positive"),
-        ("left", "N/m", rise.left, np.isfinite(rise.left) & (rise.left >= 0), "zero or positive"),
-    )
-    for name, unit, values, good, rule in rules:
-        if not np.all(good):
-            raise InputError(
-                f"{name} = {values[~good][0]:g} {unit} of the arms of a creeping bond must be finite and {rule}"
-            )
+def _refuse(name: str, values: np.ndarray, good: np.ndarray, rise: Arms) -> None:
+    if values.shape != rise.left.shape:
+        raise InputError(f"{name} of {values.size} bonds for the arms of {rise.left.size}: one each is needed")
+    if not good.all():
+        raise InputError(f"{name} = {values[~good][0]:g} of a creeping bond must be positive")

@@ -241,8 +241,9 @@ def test_clock(bundle: Bundle) -> Clock:
         return steady(bundle.loading.cmod_rate)
     cmod, time = bundle.curve.cmod, bundle.curve.time
     opened = np.flatnonzero(cmod > np.maximum.accumulate(np.concatenate([[0.0], cmod[:-1]])))
-    after = opened[time[opened] > time[0]]
-    return Clock(np.concatenate([[0.0], cmod[after]]), np.concatenate([[0.0], time[after] - time[0]]))
+    rest = time[max(opened[0] - 1, 0)] if opened.size else time[0]  # before the mouth opened nothing was loaded
+    after = opened[time[opened] > rest]
+    return Clock(np.concatenate([[0.0], cmod[after]]), np.concatenate([[0.0], time[after] - rest]))
 
 
 def frame_stations(bundle: Bundle) -> np.ndarray:

@@ -16,11 +16,13 @@ from pipeline.gap.effect import PhysicsEffect
 from pipeline.gap.effects import checked, effect
 from pipeline.gap.plan import Place, Plan
 from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
+from pipeline.materials.creeping_mixture import creeping_law
+from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phases import lay_phases
-from pipeline.study.assembly import Model
+from pipeline.study.assembly import Model, test_clock
 
 WEAKEST = 1e-6  # of K^n and f_max, left to a bond that is cut
 STUBBORN = 2.5  # makes the compliance of a beam rise evenly while a bond goes (measured on SE(B), r = 2 mm)
@@ -108,7 +110,7 @@ def lattice_problem(model: Model, plan: Plan, problem: Problem, f_max: float, de
     bonds, particles, cut = model.bonds, model.particles, np.ones(model.bonds.count)
     if plan.specimen != model.bundle.specimen:
         particles, bonds, cut = _other_notch(model, plan.specimen)
-    law = plan.mixture.law(bonds, plan.specimen.thickness, f_max * model.force_scale, delta_max)
+    law = _law(model, plan, bonds, f_max * model.force_scale, delta_max)
     place = Place(particles.position[bonds.pairs].mean(axis=1), bonds.phase, plan.specimen)
     factors = plan.factors(place)
     soft = np.isin(bonds.phase, SOFT)
@@ -119,20 +121,32 @@ def lattice_problem(model: Model, plan: Plan, problem: Problem, f_max: float, de
     if plan.spent:
         changed = _spent(changed, plan, place.middle)
     grips = _grips(model, plan, particles)
-    return replace(problem, specimen=plan.specimen, particles=particles, bonds=bonds, law=changed, grips=grips)
+    clock = test_clock(model.bundle) if plan.creep else None
+    return replace(
+        problem, specimen=plan.specimen, particles=particles, bonds=bonds, law=changed, grips=grips, clock=clock
+    )
+
+
+def _law(
+    model: Model, plan: Plan, bonds: Bonds, f_max: float, delta_max: float
+) -> CentralSoftening | MixedSoftening | CreepingSoftening:
+    """The law of every bond of the plan's mixture; its mastic creeps, in proportion, as that of the creep test."""
+    mixture, thickness = plan.mixture, plan.specimen.thickness
+    if not plan.creep:
+        return mixture.law(bonds, thickness, f_max, delta_max)
+    mastic = model.burgers.like(mixture.mastic_modulus, plan.creep)
+    return creeping_law(mixture, mastic, bonds, thickness, f_max, delta_max)
 
 
 def held_to(problem: Problem, band: Band) -> Problem:
     """The same test; bonds outside the band take no damage."""
     law = problem.law
-    assert isinstance(law, CentralSoftening | MixedSoftening)
+    assert isinstance(law, CentralSoftening | MixedSoftening | CreepingSoftening)
     inside = band.holds(problem.particles.position[problem.bonds.pairs].mean(axis=1))
     return problem.with_law(law.spared(~inside))
 
 
 def _refuse(plan: Plan) -> None:
-    if plan.creep:
-        raise UnavailableError("creep is not simulated by this version: its engines know no creeping law yet")
     if plan.strength_per_decade:
         raise UnavailableError("a rate law is not simulated by this version: its laws do not know the rate of opening")
     if plan.specimen.geometry != "seb" and (plan.eccentricity or plan.friction):
@@ -187,7 +201,9 @@ def _crossing(particles: Particles, bonds: Bonds) -> np.ndarray:
     return np.where(crosses, one[:, 1] - one[:, 0] / run * (two[:, 1] - one[:, 1]), np.nan)
 
 
-def _spent(law: CentralSoftening | MixedSoftening, plan: Plan, middle: np.ndarray) -> LinearSoftening:
+def _spent(
+    law: CentralSoftening | MixedSoftening | CreepingSoftening, plan: Plan, middle: np.ndarray
+) -> LinearSoftening:
     """Bonds near the tip with a part of their softening behind them: the rest of the straight branch is kept."""
     if not isinstance(law, LinearSoftening):
         raise UnavailableError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +15,21 @@ from pipeline.config import RunSettings
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.particles import Phase
 from pipeline.core.specimen import Specimen
-from pipeline.core.units import MM
+from pipeline.core.units import GPA, MM
 from pipeline.equilibrium.solve import solve as find_equilibria
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.effects import checked, effect
+from pipeline.materials.burgers import Burgers
 from pipeline.microstructure.gradation import Grading, fuller_section
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle, read_bundle
+from pipeline.store.creep_sheet import read_creep_sheet
 from pipeline.store.experiment import Experiment
 from pipeline.store.images import read_grey, read_labels
 from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
 from pipeline.store.results import plain
 from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_of
+from pipeline.study.creep_analysis import mastic_creep
 from pipeline.study.effects import planned
 from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
 from pipeline.twin.problem import Truth, one_phase
@@ -51,7 +54,8 @@ class Request:
     geometry : "seb" or "dct"
     specimen : image of the specimen, photograph or labels
     mm_per_px : float; scale of `specimen`, its lower edge at the mouth and its middle on the notch line
-    like : bundle whose specimen, material and settings are taken over
+    like : bundle whose specimen, material and settings are taken over, with the creep test of its mastic
+    creep : file with the creep compliance of the mastic, which then creeps; the bundle gets it as its creep test
     f_max, delta_max : the truth, N per bond of the bundle's lattice and m
     start : (N, m) in the bundle's [start]
     radius_mm : of the bundle's lattice
@@ -67,6 +71,7 @@ class Request:
     specimen: Path | None = None
     mm_per_px: float | None = None
     like: Path | None = None
+    creep: Path | None = None
     f_max: float | None = None
     delta_max: float | None = None
     start: tuple[float, float] | None = None
@@ -97,8 +102,8 @@ class Request:
 
     @property
     def effects(self) -> dict[str, float]:
-        """All effects by name."""
-        return dict(self.effect or ())
+        """All effects by name; a creep test that is given is one, in full unless another share is asked for."""
+        return ({"creep": 1.0} if self.creep else {}) | dict(self.effect or ())
 
     @property
     def measuring(self) -> dict[str, float]:
@@ -174,20 +179,25 @@ def prepare(request: Request, name: str, rng: np.random.Generator) -> tuple[Expe
         loading = experiment.loading.model_copy(update={"cmod_max_mm": CMOD_MAX_MM[geometry]})
         experiment = experiment.model_copy(update={"loading": loading})
     experiment = at_radius(experiment, request)
+    slow = images.creep
     if request.specimen is not None:
-        return with_image(experiment, request)
-    if request.like is None:
-        return with_section(experiment, rng)
-    return experiment, images
+        experiment, images = with_image(experiment, request)
+    elif request.like is None:
+        experiment, images = with_section(experiment, rng)
+    if request.creep is not None:
+        slow, _ = read_creep_sheet(request.creep)
+        experiment = without_modulus(experiment)
+    return experiment, replace(images, creep=slow)
 
 
 def imitate(bundle: Bundle) -> tuple[Experiment, Contents]:
-    """The settings of a bundle and its specimen's image."""
+    """The settings of a bundle, its specimen's image and the creep test of its mastic."""
+    contents = Contents(creep=bundle.creep)
     if bundle.labels is not None:
-        return bundle.experiment, Contents(labels=read_labels(bundle.labels))
-    if bundle.specimen_image is not None:
-        return bundle.experiment, Contents(photograph=grey_levels(read_grey(bundle.specimen_image)))
-    return bundle.experiment, Contents()
+        contents = replace(contents, labels=read_labels(bundle.labels))
+    elif bundle.specimen_image is not None:
+        contents = replace(contents, photograph=grey_levels(read_grey(bundle.specimen_image)))
+    return bundle.experiment, contents
 
 
 def at_radius(experiment: Experiment, request: Request) -> Experiment:
@@ -198,6 +208,13 @@ def at_radius(experiment: Experiment, request: Request) -> Experiment:
     model = experiment.model.model_copy(update={"particle_radius_mm": radius})
     start = {"f_max_n": float(f"{f_max:.6g}"), "delta_max_m": delta_max}
     raw = experiment.model_copy(update={"model": model}).model_dump(exclude_none=True) | {"start": start}
+    return Experiment.model_validate(raw)
+
+
+def without_modulus(experiment: Experiment) -> Experiment:
+    """The settings of a bundle whose creep test says how stiff its mastic is."""
+    raw = experiment.model_dump(exclude_none=True)
+    raw["material"].pop("mastic_modulus_gpa", None)
     return Experiment.model_validate(raw)
 
 
@@ -285,8 +302,18 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
         rng,
         find_equilibria,
         plan=planned(bundle.specimen, nominal, request.effects),
+        mastic=_mastic(bundle, request),
         measuring=request.measuring,
     )
+
+
+def _mastic(bundle: Bundle, request: Request) -> Burgers | None:
+    """How the mastic creeps, if it does."""
+    if not request.effects.get("creep"):
+        return None
+    if bundle.creep is None:
+        raise InputError("the effect creep needs a creep test: give --creep FILE, or --like a bundle with creep.csv")
+    return mastic_creep(bundle).burgers
 
 
 def _truth_text(
@@ -304,11 +331,20 @@ def _truth_text(
         "factors": vars(test.factors),
         "noise": _noise(request),
         "effects": request.effects,
+        "creep": _constants(test.mastic),
         "sync_offset_s": clock.offset,
         "factors_check": vars(test.check),
         "energy_error": test.solution.energy.error,
     }
     return (json.dumps(plain(known), indent=2, sort_keys=True) + "\n").encode()
+
+
+def _constants(mastic: Burgers | None) -> dict[str, float] | None:
+    """How the mastic crept, by the names of the command `creep`."""
+    if mastic is None:
+        return None
+    in_gpa = {"d1_per_gpa": mastic.d1 * GPA, "d2_per_gpa": mastic.d2 * GPA, "eta1_gpa_s": mastic.eta1 / GPA}
+    return in_gpa | {"tau2_s": mastic.tau2}
 
 
 def _noise(request: Request) -> dict[str, float]:

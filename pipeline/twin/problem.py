@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.particles import Bonds, Particles, Phase
-from pipeline.core.problem import Kinematics, Problem
+from pipeline.core.problem import BondLaw, Kinematics, Problem
 from pipeline.core.specimen import Specimen
+from pipeline.materials.burgers import Burgers
+from pipeline.materials.creeping_mixture import creeping_arms
+from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.attachment import attach_gauge, attach_grips
 from pipeline.microstructure.rigid_body import main_part, rigid_part
@@ -66,22 +69,28 @@ def twin_problem(
     cmod_max: float,
     stations: np.ndarray,
     kinematics: Kinematics = Kinematics.SMALL,
+    creep: Burgers | None = None,
 ) -> Problem:
     """Phases, properties, grips and gauge laid on an irregular network; voids are left out.
 
     A bond carries K^n of its phase times √3 × facet/length (balanced, see `twin.network`), and f_max of its
-    phase times facet/(2r/√3), the facet of the hexagonal lattice: both reduce to the lattice's own values.
+    phase times facet/(2r/√3), the facet of the hexagonal lattice: both reduce to the lattice's own values. With
+    `creep` the mastic relaxes as that, and the problem needs a clock.
     """
     particles, bonds, kept = _lay_phases(specimen, network, phase_at)
     strength, opening = mixture.strength(bonds.phase, truth.f_max, truth.delta_max)
     facet = network.facet[kept] / (2 * truth.radius / np.sqrt(3))
-    stiffness = mixture.stiffness(bonds.phase, specimen.thickness) * network.stiffness[kept]
     free = ~bonds.protected
-    law = mixture.bond_law(
-        factors.stiffness * stiffness,
-        np.where(free, factors.strength * strength * facet, np.inf),
-        np.where(free, factors.opening * opening, np.inf),
-    )
+    strength = np.where(free, factors.strength * strength * facet, np.inf)
+    opening = np.where(free, factors.opening * opening, np.inf)
+    share = factors.stiffness * network.stiffness[kept]
+    if creep is None:
+        stiffness = mixture.stiffness(bonds.phase, specimen.thickness) * share
+        law: BondLaw = mixture.bond_law(stiffness, strength, opening)
+    else:
+        rise = creeping_arms(mixture, creep, bonds.phase, specimen.thickness)
+        slow = CreepingSoftening(rise, strength, opening, mixture.softening, mixture.unloading)
+        law = slow.times(share, 1.0, 1.0)
     return Problem(
         specimen=specimen,
         particles=particles,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.core.clock import steady
 from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import InputError
 from pipeline.core.field import DisplacementField
@@ -15,6 +16,7 @@ from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.gap.plan import Plan
+from pipeline.materials.burgers import Burgers
 from pipeline.materials.mixture import Mixture
 from pipeline.twin.calibration import CutCheck, calibrated_factors, check_factors
 from pipeline.twin.effects import Record, put_down, refuse_unknown, spoiled, with_effects, with_voids
@@ -108,6 +110,7 @@ class VirtualTest:
     loading_begins : float, s, on the clock of the record
     problem : Problem; the network
     solution : Solution of the engine
+    mastic : Burgers; how the mastic crept, or None
     """
 
     curve: LoadCurve
@@ -120,6 +123,7 @@ class VirtualTest:
     loading_begins: float
     problem: Problem
     solution: Solution
+    mastic: Burgers | None = None
 
     @property
     def particles(self) -> int:
@@ -141,6 +145,7 @@ def virtual_test(
     solve: Solve,
     factors: Factors | None = None,
     plan: Plan | None = None,
+    mastic: Burgers | None = None,
     measuring: Mapping[str, float] | None = None,
 ) -> VirtualTest:
     """Make a network, break it and record it.
@@ -157,7 +162,13 @@ def virtual_test(
     solve : engine, Problem → Solution
     factors : Factors; those of `twin.calibration` where not given
     plan : Plan; the test as it really is, where physics effects make it another one than specimen and mixture say
+    mastic : Burgers; how the mastic creeps where the plan says that it does, in the time of the recording
     measuring : measurement effect → value
+
+    Raises
+    ------
+    InputError
+        where the plan says that the mastic creeps, and nothing how
     """
     plan = Plan(specimen, mixture) if plan is None else plan
     refuse_unknown(plan)
@@ -168,9 +179,18 @@ def virtual_test(
     phase_at = with_voids(phase_at, plan.specimen, plan.void_share, of_effects)
     stations = recording.frame_cmod[recording.frame_cmod > 0]
     problem = twin_problem(
-        plan.specimen, network, phase_at, plan.mixture, truth, factors, recording.cmod_max * (1 + 1e-6), stations
+        plan.specimen,
+        network,
+        phase_at,
+        plan.mixture,
+        truth,
+        factors,
+        recording.cmod_max * (1 + 1e-6),
+        stations,
+        creep=_creep(plan, mastic),
     )
-    problem = with_effects(replace(problem, cmod_rate=recording.cmod_rate), plan)
+    clock = steady(recording.cmod_rate) if plan.creep else None
+    problem = with_effects(replace(problem, cmod_rate=recording.cmod_rate, clock=clock), plan)
     solution = put_down(problem, solve(problem), plan)
     curve, field = exact_record(replace(problem, specimen=specimen), solution, recording)
     record = Record(curve, field, specimen, of_effects.uniform(0, 2 * np.pi))
@@ -188,7 +208,17 @@ def virtual_test(
         loading_begins=recording.rest,
         problem=problem,
         solution=solution,
+        mastic=_creep(plan, mastic),
     )
+
+
+def _creep(plan: Plan, mastic: Burgers | None) -> Burgers | None:
+    """How the mastic of the plan's mixture creeps; None: not at all."""
+    if not plan.creep:
+        return None
+    if mastic is None:
+        raise InputError("the mastic creeps, but nothing says how: give its creep compliance")
+    return mastic.like(plan.mixture.mastic_modulus, plan.creep)
 
 
 def exact_record(problem: Problem, solution: Solution, recording: Recording) -> tuple[LoadCurve, DisplacementField]:

@@ -93,6 +93,12 @@ def test_a_shift_moves_times_only():
     assert warm.relaxation_modulus(10.0) == pytest.approx(MASTIC.relaxation_modulus(100.0), rel=1e-12)  # rounding
 
 
+def test_a_share_of_the_growth_on_another_modulus():
+    other, time = MASTIC.like(25e9, 0.3), np.logspace(-1, 4, 11)
+    growth = MASTIC.creep_compliance(time) / MASTIC.d1 - 1
+    assert other.creep_compliance(time) == pytest.approx((1 + 0.3 * growth) / 25e9, rel=1e-12)  # rounding
+
+
 @pytest.mark.parametrize("name", ["d1", "d2", "eta1", "tau2"])
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 def test_refuses_what_is_no_constant(name, value):

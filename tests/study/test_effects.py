@@ -13,12 +13,15 @@ from pipeline.core.units import MM
 from pipeline.equilibrium.solve import solve
 from pipeline.gap.effects import effect
 from pipeline.gap.plan import Plan
+from pipeline.materials.burgers import Burgers
 from pipeline.store.bundle import read_bundle
+from pipeline.store.creep import CreepRecord
 from pipeline.store.new import Contents, write_bundle
 from pipeline.study.assembly import Model, build_model
 from pipeline.study.effects import Band, held_to, lattice_problem, physics_effects, planned, settled
 from tests.helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment, edit
 
+MASTIC = Burgers(0.1e-9, 0.04e-9, 1500e9, 15.0)
 ELASTIC = 0.004 * MM  # of CMOD: nothing softens yet
 SIMULATED = [
     "modulus", "thermal_gradient", "support_friction", "eccentricity_mm", "notch_length_mm", "tip_damage",
@@ -131,10 +134,33 @@ def test_damage_is_held_to_the_band(model):
     assert np.isfinite(found.law.f_max[inside]).all()
 
 
-@pytest.mark.parametrize("name", ["creep", "rate_law_per_decade"])
-def test_what_no_engine_can_do_is_refused(model, name):
+def test_what_no_engine_can_do_is_refused(model):
     with pytest.raises(UnavailableError, match="not simulated"):
-        changed(model, **{name: 0.1})
+        changed(model, rate_law_per_decade=0.1)
+
+
+@pytest.fixture(scope="module")
+def creeping_model(tmp_path_factory) -> Model:
+    """The same beam with a creep test of its mastic."""
+    folder, time = tmp_path_factory.mktemp("creeping") / "beam", np.geomspace(0.5, 300, 40)
+    write_bundle(folder, coarse_experiment("beam"), Contents(creep=CreepRecord(time, MASTIC.creep_compliance(time))))
+    return build_model(read_bundle(folder))
+
+
+def test_creep_takes_its_part_of_the_load_in_the_time_of_the_test(creeping_model):
+    """All mastic: the load of a mouth that opens at constant rate is the mean of E over the time that it took."""
+    took = ELASTIC / creeping_model.bundle.loading.cmod_rate
+    series = MASTIC.like(10e9, 0.7).relaxation()
+    mean = float(series.modulus @ (series.time * -np.expm1(-took / series.time))) / took
+    found = load(creeping_model, creep=0.7) / load(creeping_model)
+    assert found == pytest.approx(mean / 10e9, rel=1e-4)  # solver's tolerance
+    assert found < 0.995
+    assert load(creeping_model, creep=0.0) == load(creeping_model)
+
+
+def test_creep_without_a_creep_test_is_refused(model):
+    with pytest.raises(InputError, match=r"has no creep\.csv: add the creep compliance"):
+        changed(model, creep=1.0)
 
 
 def test_shear_strength_is_refused_where_bonds_carry_no_shear(model):

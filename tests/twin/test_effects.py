@@ -103,7 +103,10 @@ def test_no_voids_no_change():
     assert with_voids(one_phase, BEAM, 0.0, np.random.default_rng(0)) is one_phase
 
 
-@pytest.mark.parametrize("name", ["creep", "rate_law_per_decade"])
-def test_what_the_network_cannot_do_is_refused(name):
+@pytest.mark.parametrize("names", [("rate_law_per_decade",), ("creep", "tip_damage")])
+def test_what_the_network_cannot_do_is_refused(names):
+    plan = Plan(BEAM, MIXTURE)
+    for name in names:
+        plan = effect(name).change(0.1, plan)
     with pytest.raises(UnavailableError, match="not in this version"):
-        refuse_unknown(effect(name).change(0.1, Plan(BEAM, MIXTURE)))
+        refuse_unknown(plan)
