@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from pipeline.blind.mesh import Mesh, shares
+from pipeline.blind.order import dissected
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +101,6 @@ class Body:
         """Openings (2c, 2), m, at displacements (size,)."""
         return (self.opener @ moved).reshape(-1, 2)
 
-    def sewn(self, tangent: np.ndarray) -> csr_matrix:
-        """Stiffness of the edges, N/m, from their tangents (2c, 2, 2), Pa/m."""
-        block = tangent * self.weight[:, None, None]
-        first = 2 * np.arange(len(block))
-        row = np.stack([first, first, first + 1, first + 1], axis=1)
-        column = np.stack([first, first + 1, first, first + 1], axis=1)
-        shape = (2 * len(block), 2 * len(block))
-        middle = coo_matrix((block.reshape(-1, 4).ravel(), (row.ravel(), column.ravel())), shape).tocsr()
-        return (self.opener.T @ middle @ self.opener).tocsr()
-
     def row(self, places: np.ndarray, direction: np.ndarray) -> csr_matrix:
         """(n, size): displacement along a direction (2,) at places (n, 2), m, of the triangle that holds each or the
         nearest one."""
@@ -129,6 +120,17 @@ class Body:
         return coo_matrix((value.reshape(-1), (row, self.own[triangle].ravel())), (len(places), self.size)).tocsr()
 
 
+def sewn(opener: csr_matrix, weight: np.ndarray, tangent: np.ndarray) -> csr_matrix:
+    """Stiffness of edges, N/m, from the tangents (q, 2, 2), Pa/m, at their ends of areas (q,), m²."""
+    block = tangent * weight[:, None, None]
+    first = 2 * np.arange(len(block))
+    row = np.stack([first, first, first + 1, first + 1], axis=1)
+    column = np.stack([first, first + 1, first, first + 1], axis=1)
+    shape = (2 * len(block), 2 * len(block))
+    middle = coo_matrix((block.reshape(-1, 4).ravel(), (row.ravel(), column.ravel())), shape).tocsr()
+    return (opener.T @ middle @ opener).tocsr()
+
+
 def join(mesh: Mesh, parts: np.ndarray, cut: np.ndarray, thickness: float) -> Body:
     """A body from a mesh.
 
@@ -146,8 +148,9 @@ def join(mesh: Mesh, parts: np.ndarray, cut: np.ndarray, thickness: float) -> Bo
     pairs = corner[fused].reshape(-1, 2)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (3 * t, 3 * t))
     nodes, label = connected_components(graph, directed=False)
-    node = label.reshape(t, 3)
     chosen = parts & ~cut
+    label = _numbered(mesh, label, int(nodes), corner[chosen])
+    node = label.reshape(t, 3)
     run = mesh.points[ends[chosen, 1]] - mesh.points[ends[chosen, 0]]
     length = np.hypot(*run.T)
     along = run / length[:, None]
@@ -165,6 +168,24 @@ def join(mesh: Mesh, parts: np.ndarray, cut: np.ndarray, thickness: float) -> Bo
         length=length,
         thickness=thickness,
     )
+
+
+def _numbered(mesh: Mesh, label: np.ndarray, nodes: int, corner: np.ndarray) -> np.ndarray:
+    """Node of every corner (3t,) under numbers in which the stiffness is quick to factorise.
+
+    `corner` (c, 2, 2): corners at the ends of the edges that can part, [edge, end, triangle].
+    """
+    place = np.zeros((nodes, 2))
+    place[label] = mesh.points[mesh.corners.ravel()]
+    of_triangle = label.reshape(-1, 3)
+    of_edge = label[corner].reshape(-1, 4)
+    pairs = np.vstack(
+        [of[:, [i, j]] for of in (of_triangle, of_edge) for i in range(of.shape[1]) for j in range(of.shape[1])]
+    )
+    neighbours = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (nodes, nodes)).tocsr()
+    number = np.empty(nodes, int)
+    number[dissected(place, neighbours)] = np.arange(nodes)
+    return np.asarray(number[label])
 
 
 def _corner(mesh: Mesh, triangle: np.ndarray, ends: np.ndarray) -> np.ndarray:

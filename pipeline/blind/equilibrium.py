@@ -9,9 +9,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
-from pipeline.blind.body import Body
+from pipeline.blind.body import Body, sewn
 from pipeline.blind.bulk import Bulk, Memory
-from pipeline.blind.machine import Machine
+from pipeline.blind.machine import STIFF, Machine
+from pipeline.blind.tie import LOOSENED, TOO_LATE, Tie, strained
 from pipeline.blind.traction import Edges
 from pipeline.core.errors import ConvergenceError
 
@@ -37,6 +38,7 @@ class Setup:
     friction : float; at contacts that rub
     cmod_rate : float, m/s; of the real test
     rate_law : float; relative change of strength per decade of opening rate over that of the mouth
+    ties : bool; edges are tied until they carry half their strength
     """
 
     body: Body
@@ -47,6 +49,16 @@ class Setup:
     friction: float = 0.0
     cmod_rate: float = 1e-5
     rate_law: float = 0.0
+    ties: bool = True
+
+    def stiffness(self, span: float) -> csr_matrix:
+        """Of the triangles in an increment of so many seconds, N/m."""
+        return self.bulk.stiffness(self.body, span) if self.bulk.relaxation.weight else self.elastic
+
+    @cached_property
+    def elastic(self) -> csr_matrix:
+        """Of the triangles at once, N/m."""
+        return self.bulk.stiffness(self.body, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +72,7 @@ class State:
     reached : (q,) array, m
     memory : Memory of the bulk
     opening_rate : (q,) array, m/s
+    tie : Tie
     work : float, J; of the machine, and of friction on the specimen
     time : float, s
     """
@@ -69,6 +82,7 @@ class State:
     reached: np.ndarray
     memory: Memory
     opening_rate: np.ndarray
+    tie: Tie
     work: float = 0.0
     time: float = 0.0
 
@@ -98,46 +112,79 @@ class Path:
 
 @dataclass(eq=False)
 class _Increment:
-    """One increment to be solved: everything that stays while Newton steps."""
+    """One increment to be solved for the independent displacements (n,): everything that stays while Newton steps."""
 
     setup: Setup
+    tie: Tie
     edges: Edges
     reached: np.ndarray
     bulk: csr_matrix
     place: float
     outer: np.ndarray
 
+    @classmethod
+    def of(
+        cls,
+        setup: Setup,
+        tie: Tie,
+        edges: Edges,
+        reached: np.ndarray,
+        bulk: csr_matrix,
+        place: float,
+        outer: np.ndarray,
+    ) -> _Increment:
+        """From edges, openings and forces of the whole body."""
+        spread = tie.spread
+        return cls(
+            setup, tie, edges.at(tie.points), reached[tie.points], (spread.T @ bulk @ spread).tocsr(), place,
+            spread.T @ outer,
+        )  # fmt: skip
+
+    @cached_property
+    def rows(self) -> csr_matrix:
+        """Of the machine's contacts."""
+        return (self.setup.machine.rows @ self.tie.spread).tocsr()
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """(q,) array, m²"""
+        return self.setup.body.weight[self.tie.points]
+
     @cached_property
     def elastic(self) -> csr_matrix:
         """Triangles and machine."""
-        return (self.bulk + self.setup.machine.stiffness).tocsr()
+        return (self.bulk + STIFF * self.rows.T @ self.rows).tocsr()
 
     @cached_property
     def pushed(self) -> np.ndarray:
         """All forces that do not depend on the displacements."""
-        return self.outer + self.setup.machine.push(self.place)
+        return self.outer + STIFF * self.place * (self.rows.T @ self.setup.machine.drive)
+
+    def opening(self, moved: np.ndarray) -> np.ndarray:
+        """(q, 2) array, m"""
+        return np.asarray(self.tie.opener @ moved).reshape(-1, 2)
 
     def energy(self, moved: np.ndarray) -> float:
         """Not by way of `elastic` and `pushed`, whose large parts cancel."""
-        sewn = self.edges.energy(self.setup.body.opening(moved), self.reached) @ self.setup.body.weight
-        stored = 0.5 * moved @ (self.bulk @ moved) + self.setup.machine.stored(moved, self.place)
-        return float(stored - self.outer @ moved + sewn)
+        parted = self.edges.energy(self.opening(moved), self.reached) @ self.weight
+        springs = self.setup.machine.drive * self.place - self.rows @ moved
+        stored = 0.5 * moved @ (self.bulk @ moved) + 0.5 * STIFF * float(springs @ springs)
+        return float(stored - self.outer @ moved + parted)
 
     def out_of_balance(self, moved: np.ndarray) -> np.ndarray:
-        body = self.setup.body
-        pull = self.edges.traction(body.opening(moved), self.reached) * body.weight[:, None]
-        return self.elastic @ moved - self.pushed + body.opener.T @ pull.ravel()
+        pull = self.edges.traction(self.opening(moved), self.reached) * self.weight[:, None]
+        return np.asarray(self.elastic @ moved - self.pushed + self.tie.opener.T @ pull.ravel())
 
     def step(self, moved: np.ndarray, rest: np.ndarray, softening: float) -> np.ndarray:
-        body = self.setup.body
-        tangent = self.edges.tangent(body.opening(moved), self.reached, softening)
-        matrix = (self.elastic + body.sewn(tangent)).tocsc()
+        tangent = self.edges.tangent(self.opening(moved), self.reached, softening)
+        matrix = (self.elastic + sewn(self.tie.opener, self.weight, tangent)).tocsc()
         return -_solve(matrix, rest)
 
 
 def _solve(matrix: csr_matrix, right: np.ndarray) -> np.ndarray:
+    """The nodes of a body are numbered for elimination (`blind.order`)."""
     found: np.ndarray = splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     ).solve(right)
     return found
 
@@ -204,8 +251,9 @@ def solve(setup: Setup, cmod_max: float) -> Path:
     ConvergenceError
         where an increment has no equilibrium
     """
-    state = State(0.0, np.zeros(setup.body.size), setup.spent, setup.bulk.fresh(), np.zeros(len(setup.spent)))
-    states, total, stretch = [state], 0, _first_stretch(setup)
+    tie = Tie(setup.body, _loose_at_first(setup))
+    state = State(0.0, np.zeros(setup.body.size), setup.spent, setup.bulk.fresh(), np.zeros(len(setup.spent)), tie)
+    states, total, stretch = [state], 0, _first_stretch(setup, tie)
     before, resting = np.zeros(setup.body.size), 0
     while setup.machine.cmod(states[-1].moved) < cmod_max:
         state, share = states[-1], 1.0
@@ -240,29 +288,42 @@ def _wanted(cmod: float, cmod_max: float) -> float:
     return min(FIRST_STEP, coarse) if cmod < FINE_UNTIL else coarse
 
 
-def _first_stretch(setup: Setup) -> float:
+def _loose_at_first(setup: Setup) -> np.ndarray:
+    """Edges (c,) that are never tied: all, or those that were hurt before the test."""
+    hurt: np.ndarray = np.asarray(np.max(setup.spent.reshape(-1, 2), axis=1) > 0)
+    return hurt if setup.ties else np.ones(len(hurt), bool)
+
+
+def _first_stretch(setup: Setup, tie: Tie) -> float:
     """Machine displacement per CMOD of the sound specimen."""
-    elastic = setup.bulk.stiffness(setup.body, 0.0) + setup.machine.stiffness
-    sound = setup.edges.tangent(np.zeros((len(setup.spent), 2)), setup.spent, 0.0)
-    moved = _solve((elastic + setup.body.sewn(sound)).tocsc(), setup.machine.push(1.0))
-    return 1.0 / setup.machine.cmod(moved)
+    nothing = np.zeros(setup.body.size)
+    first = _Increment.of(setup, tie, setup.edges, setup.spent, setup.elastic, 1.0, nothing)
+    start = tie.gathered(nothing)
+    moved = first.step(start, first.out_of_balance(start), 0.0)
+    return 1.0 / setup.machine.cmod(tie.spread @ moved)
 
 
 def _advance(setup: Setup, state: State, cmod: float, machine: float, guess: np.ndarray) -> tuple[State, int]:
     """The state after one increment of about `cmod` and exactly `machine` (m)."""
     body, place = setup.body, state.machine + machine
     span = max((setup.machine.cmod(state.moved) + cmod) / setup.cmod_rate - state.time, 1e-9)
-    bulk = setup.bulk.stiffness(body, span)
+    bulk = setup.stiffness(span)
     outer = -setup.bulk.history(body, state.memory, state.moved, span)
     edges = _at_rate(setup, state)
     tolerance = TOLERANCE * (float(np.median(edges.strength * body.weight)) if body.weight.size else 1.0)
-    moved, total = state.moved + guess, 0
+    moved, total, tie = state.moved + guess, 0, state.tie
     rubbing = np.zeros(body.size)
-    for _ in range(1 if not setup.friction else 4):
+    slips = 1 if not setup.friction else 4
+    while slips:
         if setup.friction:
             rubbing = setup.machine.friction(moved, place, setup.friction)
-        moved, count = _newton(_Increment(setup, edges, state.reached, bulk, place, outer + rubbing), moved, tolerance)
-        total += count
+        increment = _Increment.of(setup, tie, edges, state.reached, bulk, place, outer + rubbing)
+        found, count = _newton(increment, tie.gathered(moved), tolerance)
+        moved, total = np.asarray(tie.spread @ found), total + count
+        load_share = np.where(tie.loose, 0.0, strained(body, setup.bulk, edges, moved))
+        if np.any(load_share > LOOSENED):
+            tie = Tie(body, tie.loose | (load_share > LOOSENED))
+        slips -= bool(np.all(load_share < TOO_LATE))
     now = edges.effective(body.opening(moved))
     load = 0.5 * (setup.machine.load(moved, place) + setup.machine.load(state.moved, state.machine))
     work = state.work + load * machine + float(rubbing @ (moved - state.moved))
@@ -271,7 +332,7 @@ def _advance(setup: Setup, state: State, cmod: float, machine: float, guess: np.
     memory = setup.bulk.remember(body, state.memory, moved - state.moved, span)
     reached = np.maximum(state.reached, now)
     return replace(
-        state, machine=place, moved=moved, reached=reached, memory=memory, opening_rate=rate, work=work,
+        state, machine=place, moved=moved, reached=reached, memory=memory, opening_rate=rate, tie=tie, work=work,
         time=state.time + span,
     ), total  # fmt: skip
 

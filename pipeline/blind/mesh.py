@@ -120,7 +120,9 @@ def edge_size(points: np.ndarray, zone: Zone, edge: float) -> np.ndarray:
     return np.minimum(edge + GROWTH * zone.distance(points), COARSEST * edge)
 
 
-def triangulate(specimen: Specimen, zone: Zone, edge: float, rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
+def triangulate(
+    specimen: Specimen, zone: Zone, edge: float, rng: np.random.Generator, straight: bool = False
+) -> tuple[Mesh, np.ndarray]:
     """Irregular triangles over a specimen.
 
     Parameters
@@ -129,13 +131,14 @@ def triangulate(specimen: Specimen, zone: Zone, edge: float, rng: np.random.Gene
     zone : Zone; edges have the wanted length there
     edge : float, m
     rng : numpy Generator
+    straight : bool; the line of a notch of zero width goes on through the specimen as a row of edges
 
     Returns
     -------
     mesh : Mesh
-    slit : (k,) int array; points on a notch of zero width, from the mouth to the tip
+    slit : (k,) int array; points on a notch of zero width, from the mouth to the tip, or on to the other side
     """
-    wall, slit_count = _wall(specimen, zone, edge)
+    wall, slit_count = _wall(specimen, zone, edge, straight)
     inside = _scatter(specimen, zone, edge, wall, rng)
     points = np.vstack([wall, inside])
     fixed = len(wall)
@@ -154,13 +157,15 @@ def triangulate(specimen: Specimen, zone: Zone, edge: float, rng: np.random.Gene
     return mesh, slit
 
 
-def _wall(specimen: Specimen, zone: Zone, edge: float) -> tuple[np.ndarray, int]:
+def _wall(specimen: Specimen, zone: Zone, edge: float, straight: bool) -> tuple[np.ndarray, int]:
     """Points on the boundary, those of a notch of zero width first and from mouth to tip; how many these are."""
     *bodies, notch = specimen.outline()
     tip = np.asarray(specimen.tip)
     slit = np.zeros((0, 2))
     if specimen.notch_width == 0:
         slit = _walk(np.array([(0.0, 0.0), tip]), zone, edge, closed=False)
+        if straight:
+            slit = np.vstack([slit, _walk(np.array([tip, (0.0, specimen.bounds[3])]), zone, edge, closed=False)[1:]])
     else:
         bodies = [*bodies, notch]
     rim = np.vstack([_walk(body, zone, edge, closed=True) for body in bodies])

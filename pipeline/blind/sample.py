@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.blind.body import Body, hanging_together, join
 from pipeline.blind.bulk import Bulk, Relaxation, burgers_relaxation, elasticity
-from pipeline.blind.calibration import TORTUOSITY
+from pipeline.blind.calibration import ENERGY, STRENGTH
 from pipeline.blind.equilibrium import Setup
 from pipeline.blind.machine import machine_of
 from pipeline.blind.mesh import Mesh, Zone, triangulate
@@ -138,22 +138,27 @@ def zone_of(specimen: Specimen) -> Zone:
     return Zone(HALF_ZONE, low, specimen.bounds[3])
 
 
-def setup_of(sample: Sample, rng: np.random.Generator) -> Setup:
-    """Mesh, edges, bulk and machine of a sample; mesh and voids come from `rng`."""
+def setup_of(sample: Sample, rng: np.random.Generator, straight: bool = False) -> Setup:
+    """Mesh, edges, bulk and machine of a sample; mesh and voids come from `rng`.
+
+    `straight`: only edges on the notch line can part, with the material's own strength and energy; for comparison.
+    """
     specimen, material = sample.true_specimen, sample.true_material
     of_mesh, of_voids = rng.spawn(2)
     zone = zone_of(specimen)
-    mesh, slit = triangulate(specimen, zone, sample.edge, of_mesh)
+    mesh, slit = triangulate(specimen, zone, sample.edge, of_mesh, straight)
     phase, stone = _phases(mesh, sample.phase_at)
     gone = (phase == Phase.VOID) | _voids(mesh, phase, zone, sample.effect("air_voids"), of_voids)
     mesh, phase, stone = mesh.without(gone), phase[~gone], stone[~gone]
-    firm = hanging_together(mesh, _cut(mesh, slit))
+    notch = slit[mesh.points[slit, 1] < specimen.tip[1] + 1e-9]
+    firm = hanging_together(mesh, _cut(mesh, notch))
     mesh, phase, stone = mesh.without(~firm), phase[firm], stone[firm]
-    cut = _cut(mesh, slit)
+    cut = _cut(mesh, notch)
     ends, _ = mesh.inner_edges
     middle = mesh.points[ends].mean(axis=1)
-    body = join(mesh, zone.holds(middle) & ~specimen.protected(middle), cut, specimen.thickness)
-    edges = _edges(body, specimen, material, phase, stone, sample)
+    parts = _cut(mesh, slit) if straight else zone.holds(middle) & ~specimen.protected(middle)
+    body = join(mesh, parts, cut, specimen.thickness)
+    edges = _edges(body, specimen, material, phase, stone, sample, straight)
     spent = np.where(
         np.repeat(np.hypot(*(body.middle - specimen.tip).T) <= HURT, 2),
         edges.first + sample.effect("tip_damage") * (edges.last - edges.first),
@@ -222,8 +227,9 @@ def _warmth(sample: Sample, specimen: Specimen, height: np.ndarray, stone: np.nd
 
 
 def _edges(
-    body: Body, specimen: Specimen, material: Material, phase: np.ndarray, stone: np.ndarray, sample: Sample
-) -> Edges:
+    body: Body, specimen: Specimen, material: Material, phase: np.ndarray, stone: np.ndarray, sample: Sample,
+    straight: bool,
+) -> Edges:  # fmt: skip
     """Law of both ends of every edge, from the triangles beside it."""
     one, two = body.sides.T
     stony = (phase[one] == Phase.AGGREGATE) & (phase[two] == Phase.AGGREGATE)
@@ -235,7 +241,9 @@ def _edges(
     opening = np.where(mixed, material.interface_opening, 1.0) * last
     strength = np.where(whole, material.stone_strength, strength)
     opening = np.where(whole, 2 * material.stone_energy / material.stone_strength, opening)
-    strength = strength * _warmth(sample, specimen, body.middle[:, 1], whole) / TORTUOSITY
+    costs = (1.0, 1.0) if straight else (STRENGTH, ENERGY)
+    strength = strength * _warmth(sample, specimen, body.middle[:, 1], whole) / costs[0]
+    opening = opening * costs[0] / costs[1]
     modulus = np.where(stony, material.aggregate_modulus, material.mastic_modulus)
     return Edges(
         penalty=np.repeat(PENALTY * modulus / sample.edge, 2),

@@ -7,7 +7,7 @@ Closing to the origin; contact is as stiff as the penalty.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,6 +76,10 @@ class Edges:
     last: np.ndarray
     beta: float
     branch: Branch
+
+    def at(self, chosen: np.ndarray) -> Edges:
+        """Only some of the points (q,) bool."""
+        return replace(self, penalty=self.penalty[chosen], strength=self.strength[chosen], last=self.last[chosen])
 
     @property
     def first(self) -> np.ndarray:

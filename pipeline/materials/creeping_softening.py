@@ -25,7 +25,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.problem import Problem
-from pipeline.materials.cohesive import CentralSoftening, Factor
+from pipeline.materials.cohesive import CentralSoftening, Factor, refuse_values
 from pipeline.materials.relaxation import Arms, crept, history_force, relax, stored, tangent, total
 from pipeline.materials.softening import LINEAR, Softening, Unloading, named_unloading
 
@@ -74,9 +74,15 @@ class CreepingSoftening:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unloading", named_unloading(self.unloading))
-        f_max, delta_max = np.asarray(self.f_max, float), np.asarray(self.delta_max, float)
-        _refuse("f_max", f_max, f_max > 0, self.rise)
-        _refuse("delta_max", delta_max, (delta_max > 0) | ~np.isfinite(f_max), self.rise)
+        for name in ("f_max", "delta_max"):
+            values = np.array(getattr(self, name), float)
+            if values.shape != self.rise.left.shape:
+                raise InputError(
+                    f"{name} of {values.size} bonds for the arms of {self.rise.left.size}: one each is needed"
+                )
+            object.__setattr__(self, name, values)
+        _refuse_arms(self.rise)
+        refuse_values(self.k_n, self.f_max, self.delta_max)
 
     def of(self, bonds: np.ndarray) -> CreepingSoftening:
         """The law of some of the bonds: numbers (k,) or bools (m,)."""
@@ -254,8 +260,16 @@ def refuse_timeless(problem: Problem) -> None:
         raise InputError("the problem has a clock, t(CMOD), but no bond creeps: leave it out")
 
 
-def _refuse(name: str, values: np.ndarray, good: np.ndarray, rise: Arms) -> None:
-    if values.shape != rise.left.shape:
-        raise InputError(f"{name} of {values.size} bonds for the arms of {rise.left.size}: one each is needed")
-    if not good.all():
-        raise InputError(f"{name} = {values[~good][0]:g} of a creeping bond must be positive")
+def _refuse_arms(rise: Arms) -> None:
+    """Refuse arms that are no springs and dashpots; one of no stiffness is none, whatever its time."""
+    some = rise.stiffness != 0
+    rules = (
+        ("stiffness", "N/m", rise.stiffness, np.isfinite(rise.stiffness) & (rise.stiffness >= 0), "zero or positive"),
+        ("time", "s", rise.time, ~some | (np.isfinite(rise.time) & (rise.time > 0)), "positive"),
+        ("left", "N/m", rise.left, np.isfinite(rise.left) & (rise.left >= 0), "zero or positive"),
+    )
+    for name, unit, values, good, rule in rules:
+        if not np.all(good):
+            raise InputError(
+                f"{name} = {values[~good][0]:g} {unit} of the arms of a creeping bond must be finite and {rule}"
+            )

@@ -71,7 +71,7 @@ class MixedSoftening:
     Parameters
     ----------
     k_n, k_s : (m,) arrays, N/m, positive
-    f_max, f_shear : (m,) arrays, N, positive; strengths in pure opening and pure sliding; f_max inf: no damage
+    f_max, f_shear : (m,) arrays, N, positive; strengths in pure opening and pure sliding; both inf: no damage
     delta_max, delta_shear : (m,) arrays, m; ends of the linear laws of the same area
     softening : Softening
     unloading : Unloading
@@ -162,7 +162,8 @@ class MixedSoftening:
     def advance(self, state: MixedState, opening: np.ndarray, sliding: np.ndarray) -> MixedState:
         """The state after bonds were brought to openings (m,) and slidings (m,), m.
 
-        Energy is exact along a direction that does not change within the step.
+        Energy is exact along a direction that does not change within the step, that of friction where the bond is
+        pressed as much as before.
         """
         step = self._damaged if self.unloading is Unloading.SECANT else self._yielded
         after = step(state, opening, sliding)
@@ -271,6 +272,13 @@ def _refuse_shear(law: MixedSoftening) -> None:
     rules = (
         ("k_s", "N/m", law.k_s, np.isfinite(law.k_s) & (law.k_s > 0), "finite and positive"),
         ("f_shear", "N", law.f_shear, ~free | (np.isfinite(law.f_shear) & (law.f_shear > 0)), "finite and positive"),
+        (
+            "f_shear",
+            "N",
+            law.f_shear,
+            free | ~np.isfinite(law.f_shear),
+            "inf where f_max is: a bond takes damage in both modes or in none",
+        ),
         (
             "delta_shear",
             "m",

@@ -72,7 +72,8 @@ def verdict_section(result: Mapping[str, Any], remarks: Any) -> Section:
         told.append(f"To check: {result['separate_by'][0].partition(': ')[2]}.")
     hidden = result["cannot_exclude"]
     if hidden:
-        told.append(f"Whatever is said here, {len(hidden)} effects cannot be excluded by these data (listed below).")
+        count = f"{len(hidden)} effect{'s' if len(hidden) > 1 else ''}"
+        told.append(f"Whatever is said here, {count} cannot be excluded by these data (listed below).")
     return Section(
         "The verdict", text=" ".join(told), numbers=[*_sizes(result), *_parameters(result)], notes=list(remarks)
     )

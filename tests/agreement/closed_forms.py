@@ -114,7 +114,7 @@ def follow(bond: Bond, path: np.ndarray) -> np.ndarray:
 
 def _damaging(bond: Bond, path: np.ndarray) -> Iterator[list[float]]:
     """Secant unloading: F = (1 − D) K δ, compression as if nothing had happened."""
-    damage, used, place = 0.0, 0.0, None
+    damage, used, spring = 0.0, 0.0, None
     for opening, sliding, _ in path:
         size, _, _, onset, end, stiffness = bond.ray(opening, sliding)
         way = min(max((size - onset) / (end - onset), 0.0), bond.branch.end)
@@ -125,14 +125,14 @@ def _damaging(bond: Bond, path: np.ndarray) -> Iterator[list[float]]:
         normal = bond.k_n * opening * (1.0 if opening < 0 else 1 - damage)
         stored = 0.5 * (normal * opening + shear * sliding)
         if damage == 1.0 and bond.friction:
-            shear, place, used = _rub(bond, opening, sliding, place, used)
+            shear, spring, used = _rub(bond, opening, sliding, spring, used)
             stored = 0.5 * normal * opening + (0.5 * shear**2 / bond.k_s if shear else 0.0)
         yield [normal, shear, stored, used, _pure_opening(bond, damage), damage, damage if bond.k_s else 0.0]
 
 
 def _yielding(bond: Bond, path: np.ndarray) -> Iterator[list[float]]:
     """Elastic unloading: F = K (δ − p); the way grows with the plastic deformation, along the elastic direction."""
-    way, used, place = 0.0, 0.0, None
+    way, used, spring = 0.0, 0.0, None
     plastic = np.zeros(2)
     last = bond.branch.end
     for opening, sliding, _ in path:
@@ -146,7 +146,7 @@ def _yielding(bond: Bond, path: np.ndarray) -> Iterator[list[float]]:
         normal = bond.k_n * (opening if opening < 0 else max(opening - plastic[0], 0.0) if way < last else 0.0)
         shear = bond.k_s * (sliding - plastic[1]) if way < last else 0.0
         if way >= last and bond.friction:
-            shear, place, used = _rub(bond, opening, sliding, place, used)
+            shear, spring, used = _rub(bond, opening, sliding, spring, used)
         stored = 0.5 * normal**2 / bond.k_n + (0.5 * shear**2 / bond.k_s if bond.k_s else 0.0)
         peak = bond.f_n / bond.k_n
         seen = peak + way * (bond.d_n - peak) if way > 0 else 0.0
@@ -154,17 +154,21 @@ def _yielding(bond: Bond, path: np.ndarray) -> Iterator[list[float]]:
         yield [normal, shear, stored, used, seen, harm, way if bond.k_s else 0.0]
 
 
-def _rub(bond: Bond, opening: float, sliding: float, place: float | None, used: float) -> tuple[float, float, float]:
-    """A spring that slides at μ times the compression, from where the bond failed; open: nothing."""
-    place = sliding if place is None else place
+def _rub(
+    bond: Bond, opening: float, sliding: float, spring: tuple[float, float] | None, used: float
+) -> tuple[float, tuple[float, float], float]:
+    """A spring that slides at μ times the compression, from where the bond failed; opening lets it go.
+
+    `spring`: how far it was stretched by the step before, and from where.
+    """
+    stretch, place = spring or (0.0, sliding)
     limit = bond.friction * bond.k_n * max(-opening, 0.0)
     if limit == 0:
-        return 0.0, sliding, used + 0.5 * bond.k_s * (sliding - place) ** 2
+        return 0.0, (0.0, sliding), used + 0.5 * bond.k_s * stretch**2
     pull = bond.k_s * (sliding - place)
-    if abs(pull) <= limit:
-        return pull, place, used
-    slid = (abs(pull) - limit) / bond.k_s
-    return float(np.sign(pull)) * limit, place + float(np.sign(pull)) * slid, used + limit * slid
+    slid = float(np.sign(pull)) * max(abs(pull) - limit, 0.0) / bond.k_s
+    stretch = sliding - place - slid
+    return bond.k_s * stretch, (stretch, place + slid), used + limit * abs(slid)
 
 
 def _pure_opening(bond: Bond, damage: float) -> float:
@@ -226,7 +230,7 @@ def _creep(own: Creeping, path: np.ndarray) -> Iterator[list[float]]:
         step = to - opening
         jump = opening + own.d1 * (bond.f_n - state[0])
         if onset is None and not duration and to >= jump:
-            onset, reached = jump, max(to, 0.0)
+            onset, reached = jump, to
             used += own.stored(state) + 0.5 * (state[0] + bond.f_n) * (jump - opening)
             used += _branch_work(bond, onset, reached)
         elif onset is None:
@@ -242,7 +246,7 @@ def _creep(own: Creeping, path: np.ndarray) -> Iterator[list[float]]:
             yield [state[0], 0.0, own.stored(state), used, 0.0, 0.0, 0.0]
             continue
         force, way = _softened(bond, to, onset, reached), _way(bond, onset, reached)
-        stored = 0.5 * force * (force / bond.k_n if bond.elastic else to)
+        stored = 0.5 * force * (force / bond.k_n if bond.elastic else to - _origin(bond, onset))
         yield [force, 0.0, stored, used, peak + way * (bond.d_n - peak), bond.harm(way, peak, bond.d_n), 0.0]
 
 
@@ -252,17 +256,23 @@ def _way(bond: Bond, onset: float, reached: float) -> float:
     return min((reached - onset) / (bond.d_n - onset), bond.branch.end)
 
 
+def _origin(bond: Bond, onset: float) -> float:
+    """Where a line of slope K(0) through the peak starts, if the bond has become shorter: there it is at rest."""
+    return min(onset - bond.f_n / bond.k_n, 0.0)
+
+
 def _softened(bond: Bond, opening: float, onset: float, reached: float) -> float:
     top = bond.f_n * bond.branch.left(_way(bond, onset, reached)) if onset < bond.d_n else 0.0
-    if opening <= 0:
-        return bond.k_n * opening
-    return max(top - bond.k_n * (reached - opening), 0.0) if bond.elastic else top * opening / reached
+    own, furthest = opening - _origin(bond, onset), reached - _origin(bond, onset)
+    if own <= 0:
+        return bond.k_n * own
+    return max(top - bond.k_n * (furthest - own), 0.0) if bond.elastic else top * own / furthest
 
 
 def _branch_work(bond: Bond, onset: float, reached: float) -> float:
     """Area below the branch from δ* on, less what can be had back."""
     area = (
-        bond.f_n * max(bond.d_n - onset, 0.0) * bond.branch.integral(bond.branch.left, 0.0, _way(bond, onset, reached))
+        bond.branch.integral(bond.branch.left, 0.0, _way(bond, onset, reached)) * bond.f_n * max(bond.d_n - onset, 0.0)
     )
     top = bond.f_n * bond.branch.left(_way(bond, onset, reached)) if onset < bond.d_n else 0.0
-    return area - 0.5 * top * (top / bond.k_n if bond.elastic else reached)
+    return area - 0.5 * top * (top / bond.k_n if bond.elastic else reached - _origin(bond, onset))

@@ -111,6 +111,17 @@ BREAK = [
     (3000.0, 1.0),
     (5.0, 0.0),
 ]
+SHORT = [
+    (-3.0, 10.0),
+    (-3.0, 400.0),
+    (-2.5, 1.0),
+    (-1.8, 0.0),
+    (-1.5, 2.0),
+    (-2.2, 1.0),
+    (-9.0, 1.0),
+    (0.5, 3.0),
+    (90.0, 1.0),
+]
 LATE = [(100.0, 4.5e4), (300.0, 9e4), (620.0, 1.44e5), (640.0, 0.0), (650.0, 1.0), (-1.0, 1.0)]
 
 
@@ -129,6 +140,7 @@ def timed(steps: list[tuple[float, float]]) -> np.ndarray:
 CREEPING = {
     "relaxation": (*creeping("linear", Unloading.SECANT), timed(RELAX)),
     **{f"creep and failure, {n}, {u}": (*creeping(n, u), timed(BREAK)) for n in SHAPES for u in Unloading},
+    **{f"crept under compression, {n}, {u}": (*creeping(n, u), timed(SHORT)) for n in SHAPES for u in Unloading},
     **{f"strength beyond delta_max, {u}": (*creeping("linear", u), timed(LATE)) for u in Unloading},
 }
 

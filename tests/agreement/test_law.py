@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.materials.softening import Softening
 
 from .following import COLUMNS, Follow, Refused, python, scales
-from .law_table import DN, DT, FN, FT, KN, KS, SHAPES, TABLE
+from .law_table import DN, DT, FN, FT, KN, KS, SHAPES, TABLE, creeping
 
 SAME = 1e-12  # asked for: a handful of roundings of 1e-16 each, magnified by delta_max/delta_peak at most
 
@@ -75,6 +76,9 @@ REFUSED = [
     (lambda: MixedSoftening(KN, 0.0, FN, FT, DN, DT), f"{KN} {FN} {DN} shear 0 {FT} {DT}"),
     (lambda: MixedSoftening(KN, -3.0, FN, FT, DN, DT), f"{KN} {FN} {DN} shear -3 {FT} {DT}"),
     (lambda: MixedSoftening(KN, KS, FN, np.inf, DN, DT), f"{KN} {FN} {DN} shear {KS} inf {DT}"),
+    (lambda: MixedSoftening(KN, KS, np.inf, FT, DN, DT), f"{KN} inf {DN} shear {KS} {FT} {DT}"),
+    (lambda: replace(creeping(), f_max=np.zeros(1)), f"{KN} 0 {DN} relax 1 1 5"),
+    (lambda: replace(creeping(), delta_max=np.array([np.inf])), f"{KN} {FN} inf relax 1 1 5"),
     (lambda: MixedSoftening(KN, KS, FN, FT, DN, 0.0), f"{KN} {FN} {DN} shear {KS} {FT} 0"),
     (lambda: MixedSoftening(KN, KS, FN, FT, DN, 1e-8), f"{KN} {FN} {DN} shear {KS} {FT} 1e-8"),
     (
@@ -103,7 +107,11 @@ def test_both_refuse_in_the_same_sentence(make: Callable[[], object], words: str
         ("1e8 71 strong", "delta_max = strong must be a number"),
         ("1e8 71 1e-4 creep", "does not know 'creep'"),
         ("1e8 71 1e-4 friction 0.3", "friction = 0.3 needs bonds that slide"),
-        ("1e8 71 1e-4 relax 9", "relax takes 1 to 4 arms"),
+        ("1e8 71 1e-4 relax 9", "relax = 9 must be a whole number of arms, 1 to 4"),
+        ("1e8 71 1e-4 relax 0", "relax = 0 must be a whole number of arms, 1 to 4"),
+        ("1e8 71 1e-4 relax 1.5", "relax = 1.5 must be a whole number of arms, 1 to 4"),
+        ("1e8 71 1e-4 relax", "number of arms of relax is missing"),
+        ("1e8 71 1e-4 shear", "k_s is missing"),
         ("1e8 71 1e-4 relax 1 1.5 3", "sum of shares = 1.5 of the arms must be at most 1"),
         ("1e8 71 1e-4 relax 1 0.5 0", "time = 0 s of an arm must be finite and positive"),
         ("1e8 71 1e-4 relax 1 0.5 1 shear 1e7 50 1e-4", "bonds that relax cannot have a shear stiffness"),

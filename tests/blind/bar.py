@@ -1,4 +1,4 @@
-"""A bar in tension between rigid ends, for closed forms."""
+"""A bar in tension between ends that slide freely along themselves: closed forms, and what a zigzag crack costs."""
 
 from __future__ import annotations
 

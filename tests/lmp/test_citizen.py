@@ -127,6 +127,8 @@ def test_history_is_written_and_read_as_a_table(newton: str, tmp_path: Path) -> 
         ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 3 0 6e-4 0\n", "no cohesive bond between atoms 1 and 3"),
         ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 2000000000 0 6e-4 0\n", "no cohesive bond between atoms 1 and 2000000000"),
         ("ITEM: ENTRIES id1 id2 h1 h2 h3\n-1 2 0 6e-4 0\n", "no cohesive bond between atoms -1 and 2"),
+        ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1 2.5 0 6e-4 0\n", "line 2: 1 2.5 are not the ids of two atoms"),
+        ("ITEM: ENTRIES id1 id2 h1 h2 h3\n1e300 2 0 6e-4 0\n", r"line 2: 1e\+300 2 are not the ids of two atoms"),
         (None, "cannot read"),
     ],
 )
@@ -229,7 +231,17 @@ def test_rerun_remembers_from_frame_to_frame(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("style", [SMALL, FINITE])
 @pytest.mark.parametrize(
-    ("units", "step"), [("si", 1e-6), ("metal", 1e-4), ("real", 1e-1), ("lj", 1e-2), ("cgs", 1e-3)]
+    ("units", "step"),
+    [
+        ("si", 1e-6),
+        ("metal", 1e-4),
+        ("real", 1e-1),
+        ("lj", 1e-2),
+        ("cgs", 1e-3),
+        ("electron", 1e-2),
+        ("micro", 1e-3),
+        ("nano", 1e-3),
+    ],
 )
 def test_energy_of_moving_and_turning_particles_is_kept(units: str, step: float, style: str) -> None:
     """Velocity Verlet of an elastic chain: whatever the units, energy turns round but is not lost."""

@@ -49,7 +49,7 @@ def run_deck(folder: Path, *words: str, ranks: int = 1) -> None:
     if ranks > 1:
         run = [script("mpiexec"), "-n", str(ranks), *run]
     environment = os.environ | {"LAMMPS_PLUGIN_PATH": plugin.folder(), "OMP_NUM_THREADS": "1"}
-    subprocess.run(run, cwd=folder, env=environment, check=True, capture_output=True, timeout=300)
+    subprocess.run(run, cwd=folder, env=environment, check=True, capture_output=True, timeout=150 * (ranks + 1))
 
 
 def short(deck: str) -> str:

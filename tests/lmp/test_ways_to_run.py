@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,7 +31,7 @@ WAYS: dict[str, tuple[int, tuple[str, ...], Edit]] = {
     "two threads, newton on": (1, TWO_THREADS, NEWTON_ON),
     "two ranks": (2, (), str),
     "two ranks, newton on, rebuilt": (2, (), lambda deck: NEWTON_ON(REBUILT(deck))),
-    "four ranks": (4, (), lambda deck: re.sub(r"run +\$\{steps_max\} upto", "run 260", deck)),
+    "four ranks": (4, (), str),  # on two processors up to three minutes, seen beside fourteen other processes
 }
 LAWS = {"plain": {}, "sliding": OTHERS["sliding"], "creep": OTHERS["creep"]}
 
@@ -65,11 +64,9 @@ def test_the_curve_does_not_depend_on_it(
     (tmp_path / DECK).write_text(edit(deck))
     run_deck(tmp_path, *words, ranks=ranks)
     other = read_curve(tmp_path / "curve.txt")
-    rows = other["step"].size
-    assert rows == record["step"].size or way == "four ranks"
-    assert other["dissipated_j"][-1] > 0, "bonds must have softened"
+    assert other["step"].size == record["step"].size
     for name in ("load_n", "cmod_m", "stored_j", "dissipated_j"):
-        assert other[name] == pytest.approx(record[name][:rows], abs=SAME * np.abs(record[name]).max()), name
+        assert other[name] == pytest.approx(record[name], abs=SAME * np.abs(record[name]).max()), name
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

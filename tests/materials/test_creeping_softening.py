@@ -196,10 +196,22 @@ def test_bonds_without_damage_never_soften():
 
 
 def test_refusals():
-    with pytest.raises(InputError, match="f_max = 0 of a creeping bond"):
+    with pytest.raises(InputError, match=r"f_max = 0 N must be positive \(inf: the bond takes no damage\)"):
         bonds(f_max=0.0)
-    with pytest.raises(InputError, match="delta_max = -1 of a creeping bond"):
+    with pytest.raises(InputError, match="delta_max = -1 m must be finite and positive"):
         bonds(delta_max=-1.0)
+    with pytest.raises(InputError, match="delta_max = inf m must be finite and positive"):
+        bonds(delta_max=np.inf)
+    rise = arms(MASTIC, np.array([SHARE]))
+    for name, value, told in (
+        ("stiffness", -1.0, "stiffness = -1 N/m of the arms of a creeping bond must be finite and zero or positive"),
+        ("time", 0.0, "time = 0 s of the arms of a creeping bond must be finite and positive"),
+        ("left", np.nan, "left = nan N/m of the arms of a creeping bond must be finite and zero or positive"),
+    ):
+        with pytest.raises(InputError, match=told):
+            CreepingSoftening(
+                replace(rise, **{name: np.full_like(getattr(rise, name), value)}), np.array([F]), np.array([D])
+            )
     with pytest.raises(InputError, match="2 bonds for the arms of 1"):
         CreepingSoftening(arms(MASTIC, np.array([SHARE])), np.full(2, F), np.full(1, D))
 

@@ -171,6 +171,7 @@ def test_scaling_law(option: tuple[Softening, Unloading], s: float, path: list[t
     [
         ({"k_s": 0.0}, r"k_s = 0 N/m must be finite and positive"),
         ({"f_shear": -1.0}, r"f_shear = -1 N must be finite and positive"),
+        ({"f_max": np.inf}, r"f_shear = 50 N must be inf where f_max is: a bond takes damage in both modes or in none"),
         ({"delta_shear": np.nan}, r"delta_shear = nan m must be finite and positive"),
         ({"delta_shear": 5e-7}, r"delta_shear = 5e-07 m must be larger than f_shear/k_s = 5e-07 m: raise delta_shear"),
         ({"delta_max": 1e-7}, r"delta_max = 1e-07 m must be larger than delta_peak"),

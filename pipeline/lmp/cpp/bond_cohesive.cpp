@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 
 using namespace LAMMPS_NS;
@@ -36,10 +37,11 @@ void BondCohesive::Part::clear()
 }
 
 BondCohesive::BondCohesive(LAMMPS *lmp) :
-    Bond(lmp), finite(false), sliding(false), nhistory(3), history_id("COHESIVE_HISTORY"), history_index(-1),
+    Bond(lmp), finite(false), sliding(false), nhistory(3), restored(0), history_id("COHESIVE_HISTORY"), history_index(-1),
     theta(nullptr), torque(nullptr), built_calls(-1), built_step(-1), time_now(0.0), time_seen(NAN), time_given(false)
 {
   writedata = 1;
+  comm_forward = comm_reverse = 1;    // of the rotations, where bonds slide
   single_extra = NSINGLE + MOST_HISTORY;
   svector = new double[NSINGLE + MOST_HISTORY];
 }
@@ -109,7 +111,6 @@ void BondCohesive::init_style()
   if (update->whichflag == 2 && comm->me == 0)
     error->warning(FLERR, "bond_style cohesive remembers the largest opening of a minimizer's trials");
   sliding = std::any_of(law.begin(), law.end(), [](const cohesive::Law &own) { return own.slides(); });
-  comm_forward = comm_reverse = sliding ? 1 : 0;
   make_history();
   step.clear();
   for (const auto &own : law) step.emplace_back(own, 0.0);
@@ -234,17 +235,22 @@ double BondCohesive::equilibrium_distance(int /*type*/)
 
 void BondCohesive::write_restart_settings(FILE *fp)
 {
-  const double settings[2] = {finite ? 1.0 : 0.0, time_seen};
-  fwrite(settings, sizeof(double), 2, fp);
+  const double settings[] = {RESTART_FORMAT, finite ? 1.0 : 0.0, time_seen, static_cast<double>(nhistory)};
+  fwrite(settings, sizeof(double), std::size(settings), fp);
 }
 
 void BondCohesive::read_restart_settings(FILE *fp)
 {
-  double settings[2] = {0.0, 0.0};
-  if (comm->me == 0) utils::sfread(FLERR, settings, sizeof(double), 2, fp, nullptr, error);
-  MPI_Bcast(settings, 2, MPI_DOUBLE, 0, world);
-  finite = settings[0] > 0.0;
-  time_seen = settings[1];
+  double settings[4] = {};
+  const auto count = std::size(settings);
+  if (comm->me == 0) utils::sfread(FLERR, settings, sizeof(double), count, fp, nullptr, error);
+  MPI_Bcast(settings, static_cast<int>(count), MPI_DOUBLE, 0, world);
+  if (settings[0] != RESTART_FORMAT)
+    error->all(FLERR, "the restart file holds bond_style cohesive in format {:g}, this version reads format {:g}: begin "
+               "again, or go on with the version that wrote it", settings[0], RESTART_FORMAT);
+  finite = settings[1] > 0.0;
+  time_seen = settings[2];
+  restored = static_cast<int>(settings[3]);
 }
 
 // the coefficients as the words they were given in: what coeff reads is what a restart brings back

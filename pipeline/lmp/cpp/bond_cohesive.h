@@ -99,11 +99,16 @@ class BondCohesive : public Bond {
   double *partners(int atom) const;
   int follow_partners(int atom);
   void follow_partners();
+  double layout() const;
+  void refuse_layout(int atom);
   double elapsed();
 
   template <bool FINITE> void all_forces();
   template <bool FINITE, bool SLIDING> void forces_of(Part &, bool guarded);
   template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void intact_forces(Part &);
+  // of what stands in restart files; another layout, another number. Before 2 there was none
+  static constexpr double RESTART_FORMAT = 2.0;
+
   static void put_in_order(std::vector<Worn> &, size_t ordered);
   template <bool FINITE, bool SLIDING> void leave(Part &, int first, Intact &);
   template <bool FINITE, bool SLIDING, bool GUARDED, bool TALLY> void worn_forces(Part &);
@@ -122,6 +127,7 @@ class BondCohesive : public Bond {
 
   bool finite, sliding;
   int nhistory;    // columns of a bond's history
+  int restored;    // the same in the restart file, if one was read
   std::vector<cohesive::Law> law;    // by bond type
   std::vector<Plain> plain;
   std::vector<cohesive::CreepStep> step;    // by bond type, of the step at hand

@@ -19,19 +19,39 @@ void BondCohesive::make_history()
   nhistory = sliding ? 6 : 3;
   for (const auto &own : law)
     if (own.creeps()) nhistory = std::max(nhistory, 6 + own.arms);
+  if (restored && restored != nhistory)
+    error->all(FLERR, "the restart file holds {} values a bond, these bond_coeff need {}: give them the options of the run "
+               "that wrote it", restored, nhistory);
+  const int wanted = 1 + (nhistory + 1) * atom->bond_per_atom;
   if (!modify->get_fix_by_id(history_id))
-    modify->add_fix(fmt::format("{} all property/atom d2_{} {} writedata no", history_id, HISTORY_NAME,
-                                (nhistory + 1) * atom->bond_per_atom));
+    modify->add_fix(fmt::format("{} all property/atom d2_{} {} writedata no", history_id, HISTORY_NAME, wanted));
   int is_double, columns;
   history_index = atom->find_custom(HISTORY_NAME, is_double, columns);
-  if (history_index < 0 || columns != (nhistory + 1) * atom->bond_per_atom)
+  if (history_index < 0 || columns != wanted)
     error->all(FLERR, "the stored history of bond_style cohesive does not fit {} values for {} bonds per atom: give "
                "every bond_coeff, with its options, before the first run", nhistory, atom->bond_per_atom);
 }
 
+// an atom's first value says what the others are: a restart file may hold others
+double BondCohesive::layout() const
+{
+  return 1e6 * RESTART_FORMAT + 1e3 * nhistory + atom->bond_per_atom;
+}
+
+void BondCohesive::refuse_layout(int i)
+{
+  const double *kept = atom->darray[history_index][i], *end = kept + 1 + (nhistory + 1) * atom->bond_per_atom;
+  if (kept[0] == layout()) return;
+  if (std::any_of(kept, end, [](double value) { return value != 0.0; }))
+    error->one(FLERR, "atom {} brings a history of layout {:.0f}, here it is {:.0f} (format, values a bond, bonds an atom: "
+               "millions, thousands, ones): give bond_coeff the options of the run that wrote the restart file, or begin "
+               "again", atom->tag[i], kept[0], layout());
+  atom->darray[history_index][i][0] = layout();
+}
+
 double *BondCohesive::history(int i, int slot) const
 {
-  return atom->darray[history_index][i] + nhistory * slot;
+  return atom->darray[history_index][i] + 1 + nhistory * slot;
 }
 
 // behind the history of an atom's bonds: with whom they are
@@ -43,6 +63,7 @@ double *BondCohesive::partners(int i) const
 // a bond's memory goes with it to the slot where delete_bonds and the like put it; how many are of bonds that are gone
 int BondCohesive::follow_partners(int i)
 {
+  refuse_layout(i);
   const int slots = atom->bond_per_atom, own = atom->num_bond[i];
   double *partner = partners(i);
   const auto with = [&](int m) { return m < own ? static_cast<double>(atom->bond_atom[i][m]) : 0.0; };

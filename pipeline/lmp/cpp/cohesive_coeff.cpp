@@ -33,6 +33,8 @@ static std::string complaint_of_sliding(const Law &law)
   if (law.damageable()) {
     if (!positive(law.f_shear)) return broken("f_shear", law.f_shear, " N", "finite and positive");
     if (!positive(law.delta_shear)) return broken("delta_shear", law.delta_shear, " m", "finite and positive");
+  } else if (std::isfinite(law.f_shear)) {
+    return broken("f_shear", law.f_shear, " N", "inf where f_max is: a bond takes damage in both modes or in none");
   }
   if (!(std::isfinite(law.friction) && law.friction >= 0.0))
     return broken("friction", law.friction, "", "finite and zero or positive");
@@ -125,9 +127,10 @@ static void read_unloading(Words &words, Law &law)
 
 static void read_arms(Words &words, Law &law)
 {
-  const double count = words.number("relax");
+  const double count = words.number("number of arms of relax");
   law.arms = count >= 1.0 && count <= MOST_ARMS ? static_cast<int>(count) : 0;
-  if (law.arms != count) words.wrong = "relax takes 1 to " + std::to_string(MOST_ARMS) + " arms";
+  if (words.wrong.empty() && (law.arms == 0 || law.arms != count))
+    words.wrong = "relax = " + text("%g", count) + " must be a whole number of arms, 1 to " + std::to_string(MOST_ARMS);
   for (int a = 0; a < law.arms; a++) {
     law.share[a] = words.number("share of an arm");
     law.time[a] = words.number("time of an arm");
@@ -141,7 +144,7 @@ static void read_option(Words &words, Law &law)
     law.k_s = words.number("k_s");
     law.f_shear = words.number("f_shear");
     law.delta_shear = words.number("delta_shear");
-    if (law.k_s == 0.0) words.wrong = broken("k_s", 0.0, " N/m", "finite and positive");
+    if (words.wrong.empty() && law.k_s == 0.0) words.wrong = broken("k_s", 0.0, " N/m", "finite and positive");
   } else if (key == "softening") {
     read_softening(words, law);
   } else if (key == "unloading") {

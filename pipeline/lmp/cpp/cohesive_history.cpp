@@ -91,6 +91,10 @@ std::vector<double> CohesiveHistory::rows_of_file(const std::string &file, int c
         values.push_back(std::strtod(word.c_str(), &end));
         if (*end != '\0' || !std::isfinite(values.back())) wrong = fmt::format("{} line {}: {} is not a number", file, number, word);
       }
+      const auto whole = [&](double id) { return id == std::floor(id) && std::fabs(id) < MAXTAGINT; };
+      const auto row = values.end() - std::min<std::ptrdiff_t>(found, values.size());
+      if (wrong.empty() && found == columns && !(whole(row[0]) && whole(row[1])))
+        wrong = fmt::format("{} line {}: {:g} {:g} are not the ids of two atoms", file, number, row[0], row[1]);
       if (wrong.empty() && found != columns)
         wrong = fmt::format("{} line {} holds {} values, expected {}: id1 id2 and {} of history", file, number, found,
                             columns, columns - 2);

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* SPDX-License-Identifier: GPL-2.0-or-later
+   A step of fix cohesive/drive: masses, damped leapfrog, grips. What it notes, and how fast it goes:
+   fix_cohesive_drive_rule.cpp */
 
 #include "fix_cohesive_drive.h"
 
@@ -16,29 +18,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <functional>
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
 // share of the largest stable step at which the masses are set; the rest covers finite kinematics
 static constexpr double SAFETY = 0.9;
-// how much faster the rate falls than it rises
-static constexpr double HASTE = 10.0;
-// the load is off by up to about twice the lag (measured against the equilibrium engine)
-static constexpr double ERROR_PER_LAG = 2.0;
 static constexpr int NVECTOR = 16;
 // what sliding and turning of a bond's ends are bounded by: (a + b)² <= SLIDE a² + TURN b²
 static constexpr double SLIDE = 1.25, TURN = 5.0;
 
 FixCohesiveDrive::FixCohesiveDrive(LAMMPS *lmp, int narg, char **arg) :
-    Fix(lmp, narg, arg), state{}, window{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr), turning(nullptr),
+    Fix(lmp, narg, arg), state{}, bond(nullptr), mean_v(nullptr), stiffness(nullptr), turning(nullptr),
     theta(nullptr), omega_z(nullptr), torque(nullptr), inertia(nullptr)
 {
   nevery = 20;
   omega = lag_wanted = cmod_max = first_load = first_rate = lowest_rate = highest_rate = 0.0;
-  damping_now = 0.0;
   parse(narg, arg);
   vector_flag = 1;
   size_vector = NVECTOR;
@@ -166,7 +161,6 @@ void FixCohesiveDrive::setup(int)
     state.work = state.lost_before = state.kinetic;
     state.started = 1.0;
   }
-  window = {};
   damping_rate = 2.0 * omega;
   mean_rate = omega;
 }
@@ -273,9 +267,9 @@ void FixCohesiveDrive::initial_integrate(int)
   find_rotation();
   if (lists_are_old()) build_lists();
   const double dt = update->dt;
-  window.steps += 1.0;
-  window.gauge += gauge_sum();
-  window.load_line += state.load_line;
+  state.window.steps += 1.0;
+  state.window.gauge += gauge_sum();
+  state.window.load_line += state.load_line;
 
   // what the gripped particles were before the step
   std::vector<double> before;
@@ -327,122 +321,9 @@ void FixCohesiveDrive::initial_integrate(int)
     if (grip.role == REACT) react += grip.reaction;
     state.work += grip.reaction * grip.drive * state.rate * dt;
   }
-  window.drive += drive;
-  window.react += react;
+  state.window.drive += drive;
+  state.window.react += react;
   state.load_line += state.rate * dt;
-  damping_now += lost;
+  state.damping_now += lost;
   if (timed) read_clock(cmod);
-}
-
-double FixCohesiveDrive::kinetic_energy() const
-{
-  double sum = 0.0;
-  for (int i = 0; i < atom->nlocal; i++)
-    sum += 0.5 * atom->rmass[i] * (atom->v[i][0] * atom->v[i][0] + atom->v[i][1] * atom->v[i][1]);
-  if (bond->slides())
-    for (int i = 0; i < atom->nlocal; i++) sum += 0.5 * inertia[i] * omega_z[i] * omega_z[i];
-  return sum;
-}
-
-void FixCohesiveDrive::end_of_step()
-{
-  record();
-  measure_lag();
-  mark_frames();
-  choose_rate();
-}
-
-// means over the steps since the last record, and the energies now
-void FixCohesiveDrive::record()
-{
-  double stored, dissipated;
-  bond->energies(stored, dissipated);
-  const double local[5] = {window.gauge, kinetic_energy(), damping_now, stored, dissipated};
-  double all[5];
-  MPI_Allreduce(local, all, 5, MPI_DOUBLE, MPI_SUM, world);
-  const double n = std::max(window.steps, 1.0);
-  state.cmod = all[0] / n - state.cmod_zero;
-  state.kinetic = all[1];
-  state.damping += all[2];
-  state.stored = all[3];
-  state.dissipated = all[4];
-  state.load_drive = window.drive / n;
-  state.load_react = window.react / n;
-  state.load = 0.5 * (state.load_drive + state.load_react);
-  state.load_line_mean = window.load_line / n;
-  state.peak = std::max(state.peak, state.load);
-  window = {};
-  damping_now = 0.0;
-}
-
-// share of the machine's power, at peak load, that goes into motion and drag instead of the specimen
-void FixCohesiveDrive::measure_lag()
-{
-  const double lost = state.kinetic + state.damping;
-  const double power = state.peak * state.rate * nevery * update->dt;
-  const double now = power > 0.0 ? (lost - state.lost_before) / power : 0.0;
-  state.lost_before = lost;
-  // rises at once, fades over a period
-  const double share = std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
-  state.lag = std::max(std::fabs(now), state.lag * (1.0 - share));
-  state.error_sum += state.lag * state.lag * (state.cmod - state.last_cmod);
-  state.error_weight += state.cmod - state.last_cmod;
-  state.last_cmod = state.cmod;
-}
-
-void FixCohesiveDrive::mark_frames()
-{
-  state.frame_due = 1.0;
-  if (state.cmod < state.next_frame) return;
-  state.frame_due = 0.0;
-  const auto next = std::upper_bound(stations.begin(), stations.end(), state.cmod);
-  state.next_frame = next == stations.end() ? INFINITY : *next;
-}
-
-// Drag and inertia act on the load with the square of the rate: so the rate follows the square root of
-// wanted over measured lag, down ten times as fast as up. Velocities and their running means are scaled
-// with it, which keeps the specimen on its path; the energy that this takes out counts as damping.
-void FixCohesiveDrive::choose_rate()
-{
-  const double share = nevery * update->dt * omega / (2.0 * M_PI);
-  const double wish = std::sqrt(lag_wanted / std::max(state.lag, 1e-3 * lag_wanted));
-  double factor = std::clamp(std::pow(wish, share * (wish < 1.0 ? HASTE : 1.0)), 0.5, 1.0 + share);
-  factor = std::clamp(factor, lowest_rate / state.rate, highest_rate / state.rate);
-  if (factor == 1.0) return;
-  for (int i = 0; i < atom->nlocal; i++)
-    for (int k = 0; k < 2; k++) {
-      atom->v[i][k] *= factor;
-      mean_v[i][k] *= factor;
-    }
-  if (bond->slides())
-    for (int i = 0; i < atom->nlocal; i++) {
-      omega_z[i] *= factor;
-      mean_v[i][2] *= factor;
-    }
-  const double before = state.kinetic;
-  state.kinetic *= factor * factor;
-  state.damping += before - state.kinetic;
-  state.rate *= factor;
-}
-
-double FixCohesiveDrive::compute_vector(int k)
-{
-  switch (k) {
-    case 0: return state.cmod;
-    case 1: return state.load;
-    case 2: return state.load_line_mean;
-    case 3: return state.load_drive;
-    case 4: return state.load_react;
-    case 5: return state.work;
-    case 6: return state.stored;
-    case 7: return state.dissipated;
-    case 8: return state.kinetic;
-    case 9: return state.damping;
-    case 10: return state.rate;
-    case 11: return state.error_weight > 0.0 ? ERROR_PER_LAG * std::sqrt(state.error_sum / state.error_weight) : 0.0;
-    case 12: return state.frame_due;
-    case 13: return state.cmod >= cmod_max ? 1.0 : 0.0;
-    case 15: return state.time;
-    default: return state.lag;
-  }
 }

@@ -61,7 +61,12 @@ class FixCohesiveDrive : public Fix {
     double reaction;
   };
 
-  // everything that a restart has to bring back
+  // sums over the steps since the last record; of the gauge those of this rank
+  struct Window {
+    double steps, drive, react, load_line, gauge;
+  };
+
+  // everything that a restart has to bring back: doubles only
   struct State {
     double load_line, rate, cmod_zero, started;
     double work, damping, lost_before;
@@ -69,12 +74,9 @@ class FixCohesiveDrive : public Fix {
     double cmod, load, load_line_mean, load_drive, load_react, stored, dissipated, kinetic;
     double next_frame, frame_due, last_cmod;
     double widest, time;    // largest CMOD, and the time at which the test was there
+    Window window;
+    double damping_now;     // of the steps since the last record, on this rank
   } state;
-
-  // sums over the steps since the last record
-  struct Window {
-    double steps, drive, react, load_line, gauge;
-  } window;
 
   void parse(int, char **);
   void parse_grip(char **);
@@ -106,7 +108,6 @@ class FixCohesiveDrive : public Fix {
   double **mean_v;                               // running mean of the velocity: x, y, and of the rotation
   double **stiffness, **turning;                 // scratch of assign_masses
   double *theta, *omega_z, *torque, *inertia;    // rotations of the particles, or null
-  double damping_now;
   bigint built_calls, built_step;
 };
 

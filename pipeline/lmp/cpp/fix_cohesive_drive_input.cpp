@@ -46,6 +46,12 @@ void FixCohesiveDrive::parse(int narg, char **arg)
     value = utils::numeric(FLERR, arg[k + 1], false, lmp);
     k += 2;
   };
+  const auto count = [&](const char *of) {
+    const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+    if (n < 0) error->all(FLERR, "number of {} = {} must be zero or positive", of, n);
+    return n;
+  };
+  if (igroup != 0) error->all(FLERR, "fix cohesive/drive moves all particles: its group must be all, not {}", arg[1]);
   while (k < narg) {
     if (strcmp(arg[k], "grip") == 0) {
       need(5);
@@ -61,13 +67,13 @@ void FixCohesiveDrive::parse(int narg, char **arg)
       k += 2;
     } else if (strcmp(arg[k], "frames") == 0) {
       need(1);
-      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+      const int n = count("frames");
       need(n + 1);
       for (int i = 0; i < n; i++) stations.push_back(utils::numeric(FLERR, arg[k + 2 + i], false, lmp));
       k += n + 2;
     } else if (strcmp(arg[k], "clock") == 0) {
       need(1);
-      const int n = utils::inumeric(FLERR, arg[k + 1], false, lmp);
+      const int n = count("clock");
       need(2 * n + 1);
       for (int i = 0; i < n; i++) {
         clock_cmod.push_back(utils::numeric(FLERR, arg[k + 2 + 2 * i], false, lmp));

@@ -5,11 +5,15 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "error.h"
 #include "memory.h"
 
 #include <cstring>
 
 using namespace LAMMPS_NS;
+
+// of what stands in restart files; another layout, another number. Before 2 there was none
+static constexpr double FORMAT = 2.0;
 
 double FixCohesiveDrive::memory_usage()
 {
@@ -69,15 +73,26 @@ int FixCohesiveDrive::maxsize_restart()
   return NMEAN + 1;
 }
 
+// sums of single ranks stand there for all of them
 void FixCohesiveDrive::write_restart(FILE *fp)
 {
+  State all = state;
+  MPI_Reduce(&state.window.gauge, &all.window.gauge, 1, MPI_DOUBLE, MPI_SUM, 0, world);
+  MPI_Reduce(&state.damping_now, &all.damping_now, 1, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
-  const int size = sizeof(State);
+  const int size = sizeof(double) + sizeof(State);
   fwrite(&size, sizeof(int), 1, fp);
-  fwrite(&state, sizeof(State), 1, fp);
+  fwrite(&FORMAT, sizeof(double), 1, fp);
+  fwrite(&all, sizeof(State), 1, fp);
 }
 
 void FixCohesiveDrive::restart(char *buf)
 {
-  memcpy(&state, buf, sizeof(State));
+  double format;
+  memcpy(&format, buf, sizeof(double));
+  if (format != FORMAT)
+    error->all(FLERR, "the restart file holds fix cohesive/drive in format {:g}, this version reads format {:g}: begin "
+               "again, or go on with the version that wrote it", format, FORMAT);
+  memcpy(&state, buf + sizeof(double), sizeof(State));
+  if (comm->me != 0) state.window.gauge = state.damping_now = 0.0;
 }

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import __version__
+from pipeline.blind.calibration import SLIDING
 from pipeline.blind.equilibrium import Path as Broken
 from pipeline.blind.equilibrium import Setup
 from pipeline.blind.equilibrium import solve as break_triangles
@@ -190,7 +191,7 @@ def material_of(drawn: Drawn) -> Material:
         interface_strength=m.interface_strength_ratio,
         interface_opening=m.interface_opening_ratio,
         touching_is_stone=m.touching == "aggregate",
-        shear=m.shear_strength_ratio,
+        shear=SLIDING * m.shear_strength_ratio,
         creep=(d1, CREEP_SHARE * d1, CREEP_FLOW / d1, CREEP_TIME),
     )
 
