@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg.blas import daxpy
 
-MEMORY = 8  # pairs of steps kept; twelve need as many iterations, six a few more
+MEMORY = 12  # pairs of steps kept; physics of softening bonds gains nothing beyond
 
 
 class Preconditioner(Protocol):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from pipeline.core.units import MM
-from pipeline.equilibrium import cholesky, condensation, far, network, schur
+from pipeline.equilibrium import cholesky, condensation, far
 from pipeline.equilibrium.cholesky import Plan
 from pipeline.equilibrium.solve import solve
 
@@ -94,7 +94,7 @@ def test_the_engine_finds_the_same_without_the_library(monkeypatch: pytest.Monke
     problem = fracture_test(radius=1 * MM, scatter=0.6)
     problem = replace(problem, cmod_max=0.1 * MM, stations=np.array([0.05, 0.09]) * MM)
     fast = solve(problem, tolerance=1e-5)
-    for module in (condensation, far, network, schur):
+    for module in (condensation, far):
         monkeypatch.setattr(module, "available", lambda: False)
     slow = solve(problem, tolerance=1e-5)
     at = np.linspace(0.005, 0.095, 40) * MM
