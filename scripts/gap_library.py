@@ -16,7 +16,7 @@ def main() -> None:
     parser.add_argument("--specimens", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=9000)
     parser.add_argument("--radius-mm", type=float, default=1.0)
-    parser.add_argument("--temperature", type=float, default=1.0, help="at least so much")
+    parser.add_argument("--geometry", default="seb")
     parser.add_argument("--workers", type=int, default=2)
     asked = parser.parse_args()
     seeds = range(asked.first_seed, asked.first_seed + asked.specimens)
@@ -26,7 +26,7 @@ def main() -> None:
             asked.file,
             seeds=seeds,
             radius_mm=asked.radius_mm,
-            temperature=asked.temperature,
+            geometry=asked.geometry,
             workers=asked.workers,
             progress=progress,
         )

@@ -15,6 +15,7 @@ from pipeline.gap.emulator import Emulator, Signature
 from pipeline.gap.fit import Data, Fitted, fit
 from pipeline.gap.gate import Gate, gate
 from pipeline.gap.identifiability import Card, card
+from pipeline.gap.learning import local_factor
 from pipeline.gap.library import Entry
 from pipeline.gap.metric import Metric
 from pipeline.gap.noise import noise_bic
@@ -112,6 +113,7 @@ def diagnose(
     rng: np.random.Generator,
     names: Sequence[str] | None = None,
     factors: tuple[float, ...] = FACTORS,
+    closed: int = CLOSED,
 ) -> Diagnosis:
     """Diagnose one test.
 
@@ -125,6 +127,7 @@ def diagnose(
     rng : numpy Generator; of bootstrap and floor
     names : effects to be tested, all where not given
     factors : of the grid
+    closed : int; explanations whose closure is looked at
 
     Raises
     ------
@@ -134,12 +137,13 @@ def diagnose(
     counted = _Counted(simulate)
     wanted = sorted(library() if names is None else names)
     emulator, near = baseline(observation, abscissae, counted, Design(start, factors, factors), entry, wanted)
-    emulator, untested = with_signatures(emulator, counted, near.parameters, wanted)
+    entry = fitted_to(entry, observation, emulator, near)
+    emulator, untested = with_signatures(emulator, counted, emulator.rounded(near.parameters), wanted)
     known = [n for n in wanted if n not in untested]
     look = _Look(*weighed(observation, emulator, entry), known, entry.temperature)
     fits, scored = look.judge(emulator)
     emulator = confirmed(emulator, counted, fits, scored)
-    return concluded(observation, emulator, entry, known, untested, rng, len(counted.asked))
+    return concluded(observation, emulator, entry, known, untested, rng, len(counted.asked), closed)
 
 
 def concluded(
@@ -150,6 +154,7 @@ def concluded(
     untested: Mapping[str, str],
     rng: np.random.Generator,
     runs: int,
+    closed: int = CLOSED,
 ) -> Diagnosis:
     """Judge with all simulations at hand.
 
@@ -169,7 +174,7 @@ def concluded(
             f"{best.parameters[0]:.4g} N, delta_max = {best.parameters[1]:.4g} m: check units, or move [start] there"
         )
     left = data.target - best.candidate.predict(best.parameters, best.amplitudes)
-    judged = gate(observation, left, data.metric.covariance, entry.discrepancy.samples)
+    judged = gate(observation, left, data.metric.covariance, entry.freedom)
     none = fits[NONE]
     residual = data.target - none.candidate.predict(none.parameters, none.amplitudes)
     return Diagnosis(
@@ -181,7 +186,7 @@ def concluded(
         card=table,
         gate=judged,
         cells=where(observation, residual, data.metric.covariance),
-        closures=closures(observation, data, fits, scored, rng),
+        closures=closures(observation, data, fits, scored, rng, closed),
         noise_bic=noise_bic(observation, data, fits),
         verdict=verdict(scored, table, judged),
         untested=untested,
@@ -247,9 +252,21 @@ def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple
     """The data that all simulations have, with Σ = noise + discrepancy + scatter of the simulations themselves."""
     part = observation.only(observation.mask & emulator.available())
     mask = part.mask
-    covariance = np.diag(part.noise) + entry.discrepancy.covariance(part.sight, part.load_scale)
-    covariance = covariance[np.ix_(mask, mask)] + scatter(emulator, mask)
-    return part, Data(part.reading.flat()[mask], Metric(covariance), emulator.box)
+    some = np.ix_(mask, mask)
+    modes = entry.discrepancy.of_modes(part.sight, part.load_scale)[some]
+    local = np.diag(part.noise)
+    cut = part.reading.field.size
+    local[:cut, :cut] += entry.discrepancy.local(part.sight)
+    metric = Metric(modes + local[some] + scatter(emulator, mask), modes, entry.discrepancy.tail)
+    return part, Data(part.reading.flat()[mask], metric, emulator.box)
+
+
+def fitted_to(entry: Entry, observation: Observation, emulator: Emulator, best: Fitted) -> Entry:
+    """The entry with local scatter as large as this very test shows it beside its best explanation."""
+    part = observation.only(observation.mask & emulator.available())
+    reading = emulator.reading(best.parameters, best.candidate.names, best.amplitudes)
+    factor = local_factor(replace(part, reading=part.reading - reading), entry.discrepancy)
+    return replace(entry, discrepancy=entry.discrepancy.scaled(1.0, factor))
 
 
 def scatter(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
@@ -349,17 +366,22 @@ def _run_of(found: Fitted) -> Run:
 
 
 def closures(
-    observation: Observation, data: Data, fits: Mapping[str, Fitted], scored: Scored, rng: np.random.Generator
+    observation: Observation,
+    data: Data,
+    fits: Mapping[str, Fitted],
+    scored: Scored,
+    rng: np.random.Generator,
+    closed: int = CLOSED,
 ) -> dict[str, Closure]:
     """Closure of the best explanations, the runner-up's beside the first's."""
     within, across = folds(observation)
-    if not within:
+    if not within or not closed:
         return {}
     best = fits[NONE]
     none = held_out(best.candidate, data, within + across, best.parameters)
     complete = left_by_complete(best.candidate, data, within, best.parameters, rng)
     found = {}
-    for label in [label for label in scored.ranked() if label != NONE][:CLOSED]:
+    for label in [label for label in scored.ranked() if label != NONE][:closed]:
         other = held_out(fits[label].candidate, data, within + across, fits[label].parameters)
         found[label] = closure(observation, data, none, other, complete, rng.spawn(1)[0])
     return found

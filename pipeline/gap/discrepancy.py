@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pipeline.core.errors import InputError
-from pipeline.gap.modes import LOAD, MODES, amplitudes, shapes
-from pipeline.gap.observation import STAGES, Observation, Sight
+from pipeline.gap.modes import LOAD, MIRRORED, MODES, shapes
+from pipeline.gap.observation import Sight
 
 ALL = (*MODES, LOAD)
-MIDDLE = (0.5, 1.5, 6.0)  # CMOD over CMOD at peak for which the amplitudes of the three stages stand
+KNOTS = np.array([0.25, 0.6, 1.0, 2.3, 5.0, 12.0])  # CMOD over CMOD at peak, at which amplitudes of modes stand
+MIDDLE = (0.5, 1.5, 6.0)  # the same for what is local
 SPREAD = 5e-3  # m; reach of the remainder's correlation on one flank
-LENGTHS = np.geomspace(0.05e-3, 5e-3, 41)  # m of CMOD, that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """A Gaussian process for what is left between test and simulation when the model lacks nothing.
+    """A Gaussian process of unknown scale for what is left between test and simulation when the model lacks nothing.
 
-    Mode i has at CMOD c the standard deviation aᵢ(c), linear in log c between the stages and in c before the first;
-    Cov(bᵢ(c), bⱼ(c')) = aᵢ(c) aⱼ(c') Rᵢⱼ exp(−|c − c'|/length). The load counts in shares of its largest value. What
-    the modes leave is correlated alike along the CMOD, over `spread` on one flank, and not across the crack. Bonds that
-    snap one by one move single points at single stations: `white`.
+    Mode i has at CMOD c the standard deviation aᵢ(c), linear in log c between the knots and in c before the first;
+    Cov(bᵢ(c), bⱼ(c')) = aᵢ(c) aⱼ(c') Rᵢⱼ exp(−|c − c'|/length), which counts by 1 − `empirical`; the rest is the mean
+    of the products of the specimens' own waves: what specimens have in common is not spread over all shapes. The load
+    counts in shares of its largest value.
+
+    What the modes leave is correlated alike along the CMOD, over `spread` on one flank, and not across the crack. Bonds
+    that snap one by one move single points at single stations: `white`. Specimens differ in how much they differ: the
+    variance of all modes of one test is that of the process times `tail`/χ² with `tail` degrees of freedom, so that
+    differences follow Student's t.
 
     Parameters
     ----------
-    amplitude : (k, 3) array; of `ALL` in the three stages, m, and 1 for the load
+    amplitude : (k, knots) array; of `ALL`, m, and 1 for the load
     correlation : (k, k) array R
     remainder : (3,) array, m
     length : float, m of CMOD
     spread : float, m
     samples : int; specimens it was learnt from
     white : (3,) array, m; independent scatter of every displacement component in the stages
+    waves : (n, k, knots) array; what specimens were left with, m, and 1 for the load
+    empirical : float, 0 to 1; share of the waves in the covariance
+    tail : float; degrees of freedom of the modes' scale, inf: it is known
     """
 
     amplitude: np.ndarray
@@ -43,35 +51,69 @@ class Discrepancy:
     spread: float = SPREAD
     samples: int = 1
     white: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    waves: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ALL), KNOTS.size)))
+    empirical: float = 0.0
+    tail: float = np.inf
 
     def __post_init__(self) -> None:
         k = len(ALL)
-        if self.amplitude.shape != (k, 3) or self.correlation.shape != (k, k) or self.remainder.shape != (3,):
-            raise InputError(f"a discrepancy needs amplitudes (of {k} modes in 3 stages) and correlations of them all")
+        if self.amplitude.shape != (k, KNOTS.size) or self.correlation.shape != (k, k) or self.remainder.shape != (3,):
+            raise InputError(
+                f"a discrepancy needs amplitudes (of {k} modes at {KNOTS.size} knots), correlations of them all and a "
+                "remainder in three stages"
+            )
+        if self.waves.shape[1:] != self.amplitude.shape or (self.empirical > 0 and not len(self.waves)):
+            raise InputError(f"waves of shape {self.waves.shape} are not those of specimens, modes and knots")
         if not (self.length > 0 and self.spread > 0 and self.samples >= 1 and (self.amplitude >= 0).all()):
             raise InputError("lengths and number of samples of a discrepancy must be positive, amplitudes not negative")
+        if not (0 <= self.empirical <= 1 and self.tail > 0):
+            raise InputError(f"empirical = {self.empirical:g} must lie between 0 and 1, tail = {self.tail:g} above 0")
+
+    def scaled(self, modes: float, local: float = 1.0) -> Discrepancy:
+        """With standard deviations of the modes, and of what is local, this many times as large."""
+        return replace(
+            self,
+            amplitude=modes * self.amplitude,
+            waves=modes * self.waves,
+            remainder=local * self.remainder,
+            white=local * self.white,
+        )
 
     def covariance(self, sight: Sight, load_scale: float) -> np.ndarray:
         """Covariance (2sp + s, 2sp + s) of `Reading.flat`, m² and N²."""
+        found = self.of_modes(sight, load_scale)
+        cut = 2 * sight.cmod.size * len(sight.points)
+        found[:cut, :cut] += self.local(sight)
+        return found
+
+    def of_modes(self, sight: Sight, load_scale: float) -> np.ndarray:
+        """The part (2sp + s, 2sp + s) of it that has the modes' shapes."""
         s, p = sight.cmod.size, len(sight.points)
+        size = self.amplitude @ hats(sight.progress).T
         along = np.exp(-np.abs(np.subtract.outer(sight.cmod, sight.cmod)) / self.length)
-        size = np.stack([along_cmod(a, sight.progress) for a in self.amplitude])
+        spread = np.einsum("is,ij,jt,st->isjt", size, self.correlation, size, along)
+        if self.empirical > 0:
+            own = np.concatenate([self.waves, MIRRORED[:, None] * self.waves]) @ hats(sight.progress).T
+            spread = (1 - self.empirical) * spread + self.empirical / len(own) * np.einsum("nis,njt->isjt", own, own)
         basis = shapes(sight).reshape(2 * p, len(MODES))
-        root = self.correlation[:-1, :-1]
-        fields = np.einsum("ai,is,ij,jt,bj,st->satb", basis, size[:-1], root, size[:-1], basis, along, optimize=True)
-        local = along_cmod(self.remainder, sight.progress)
-        flank = np.kron(flank_correlation(sight, self.spread), np.eye(2))
-        fields += np.einsum("s,t,st,ab->satb", local, local, along, flank, optimize=True)
-        mixed = np.einsum("ai,is,i,t,st->sat", basis, size[:-1], self.correlation[:-1, -1], size[-1], along)
         cut = 2 * s * p
         found = np.zeros((cut + s, cut + s))
-        found[:cut, :cut] = fields.reshape(cut, cut) + np.diag(
-            np.repeat(along_cmod(self.white, sight.progress) ** 2, 2 * p)
-        )
+        fields = np.einsum("ai,isjt,bj->satb", basis, spread[:-1, :, :-1], basis, optimize=True)
+        mixed = np.einsum("ai,ist->sat", basis, spread[:-1, :, -1], optimize=True)
+        found[:cut, :cut] = fields.reshape(cut, cut)
         found[:cut, cut:] = load_scale * mixed.reshape(cut, s)
         found[cut:, :cut] = found[:cut, cut:].T
-        found[cut:, cut:] = load_scale**2 * np.outer(size[-1], size[-1]) * along
+        found[cut:, cut:] = load_scale**2 * spread[-1, :, -1]
         return 0.5 * (found + found.T)  # round-off of sums in another order
+
+    def local(self, sight: Sight) -> np.ndarray:
+        """Covariance (2sp, 2sp), m², of remainder and white scatter; of displacements only."""
+        s, p = sight.cmod.size, len(sight.points)
+        along = np.exp(-np.abs(np.subtract.outer(sight.cmod, sight.cmod)) / self.length)
+        size = along_cmod(self.remainder, sight.progress)
+        flank = np.kron(flank_correlation(sight, self.spread), np.eye(2))
+        found = np.einsum("s,t,st,ab->satb", size, size, along, flank, optimize=True).reshape(2 * s * p, 2 * s * p)
+        return found + np.diag(np.repeat(along_cmod(self.white, sight.progress) ** 2, 2 * p))
 
 
 def flank_correlation(sight: Sight, spread: float) -> np.ndarray:
@@ -86,138 +128,8 @@ def along_cmod(stages: np.ndarray, progress: np.ndarray) -> np.ndarray:
     return early * np.interp(np.log(np.maximum(progress, MIDDLE[0])), np.log(MIDDLE), stages)
 
 
-@dataclass(frozen=True, eq=False)
-class Remnant:
-    """What is left of one test without effects after the fit of the two parameters.
-
-    Parameters
-    ----------
-    observation : Observation; its reading is measured − simulated, its noise that of the test
-    load_scale : float, N
-    """
-
-    observation: Observation
-    load_scale: float
-
-    def waves(self, remainder: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (k, s) of `ALL`, and the variance (k, s) that noise and remainder give them; NaN where unknown.
-
-        Parameters
-        ----------
-        remainder : (1, 3) array, m; standard deviation in the stages, none where not given
-        """
-        o = self.observation
-        s, p = o.sight.cmod.size, len(o.sight.points)
-        use = o.mask[: 2 * s * p : 2].reshape(s, p)
-        take = amplitudes(o.sight, use)
-        field = np.where(use[..., None], o.reading.field, 0.0).reshape(s, 2 * p)
-        noise = np.repeat(np.where(use, o.field_std, 0.0) ** 2, 2, axis=1)
-        wave = np.einsum("ska,sa->ks", take, field)
-        hiss = np.einsum("ska,sa->ks", take**2, noise)
-        if remainder is not None:
-            local = along_cmod(remainder[0], o.sight.progress) ** 2
-            flank = np.kron(flank_correlation(o.sight, SPREAD), np.eye(2))
-            hiss += local * np.einsum("ska,ab,skb->ks", take, flank, take, optimize=True)
-        wave[:, use.sum(axis=1) < 6] = np.nan  # fewer points do not tell the modes apart
-        return np.vstack([wave, o.reading.load / self.load_scale]), np.vstack(
-            [hiss, (o.load_std / self.load_scale) ** 2]
-        )
-
-    def local(self) -> tuple[np.ndarray, np.ndarray]:
-        """Size (1, s), m, of a remainder that leaves as much beside the modes; variance (1, s) of that by noise."""
-        o = self.observation
-        s, p = o.sight.cmod.size, len(o.sight.points)
-        use = o.mask[: 2 * s * p : 2].reshape(s, p)
-        take, basis = amplitudes(o.sight, use), shapes(o.sight).reshape(2 * p, -1)
-        flank = np.kron(flank_correlation(o.sight, SPREAD), np.eye(2))
-        square, noise = np.full(s, np.nan), np.full(s, np.nan)
-        for station in np.flatnonzero(2 * use.sum(axis=1) > len(MODES)):
-            seen = np.repeat(use[station], 2)
-            beside = (np.eye(2 * p) - basis @ take[station])[np.ix_(seen, seen)]
-            share = float(np.einsum("ab,bc,ac->", beside, flank[np.ix_(seen, seen)], beside, optimize=True))
-            hiss = np.repeat(o.field_std[station], 2)[seen] ** 2
-            square[station] = np.sum((beside @ o.reading.field[station].ravel()[seen]) ** 2) / share
-            noise[station] = np.sum(beside**2 @ hiss) / share
-        return np.sqrt(square)[None], noise[None]
-
-
-def learn(remnants: list[Remnant]) -> Discrepancy:
-    """The discrepancy that explains what effect-free tests leave.
-
-    Amplitudes are second moments about zero (a bias of the simulator is a discrepancy too) with the noise taken off,
-    enlarged by (n + 2)/n in variance, because n specimens are few. Correlations between modes are shrunk towards none
-    with the weight k/(k + n) of k modes; the length is that whose exponential is nearest to the products of
-    standardised amplitudes at two stations.
-
-    Raises
-    ------
-    InputError
-        for fewer than three specimens
-    """
-    if len(remnants) < 3:
-        raise InputError(f"a discrepancy cannot be learnt from {len(remnants)} specimens: at least three are needed")
-    n = len(remnants)
-    few = (n + 2) / n
-    remainder = _by_stage([(r.observation.sight, *r.local()) for r in remnants], few)
-    waves = [(r.observation.sight, *r.waves(remainder)) for r in remnants]
-    amplitude = _by_stage(waves, few)
-    standard, heard = [], []
-    for sight, wave, hiss in waves:
-        size = np.stack([along_cmod(a, sight.progress) for a in np.where(amplitude > 0, amplitude, np.inf)])
-        standard.append(np.sqrt(few) * wave / size)
-        heard.append(1 / (1 + hiss / size**2))
-    correlation = _correlation([w * h for w, h in zip(standard, heard, strict=True)], n)
-    sights = [sight for sight, *_ in waves]
-    return Discrepancy(amplitude, correlation, remainder[0], _length(sights, standard, heard), samples=n)
-
-
-def _by_stage(parts: list[tuple[Sight, np.ndarray, np.ndarray]], factor: float) -> np.ndarray:
-    """Standard deviations (k, 3) beyond noise in the three stages, from values (k, s) and the noise's variances."""
-    found = []
-    for stage in range(len(STAGES)):
-        value = np.concatenate([v[:, sight.stage == stage] for sight, v, _ in parts], axis=1)
-        noise = np.concatenate([h[:, sight.stage == stage] for sight, _, h in parts], axis=1)
-        found.append(_root_mean(value**2, noise, factor))
-    return np.column_stack(found)
-
-
-def _root_mean(square: np.ndarray, noise: np.ndarray, factor: float) -> np.ndarray:
-    """Root of the mean square (k, j) beyond noise; at least a tenth of the whole, zero where nothing is known."""
-    known = np.isfinite(square)
-    count = np.maximum(known.sum(axis=1), 1)
-    total = np.where(known, square, 0.0).sum(axis=1) / count
-    beyond = total - np.where(known, noise, 0.0).sum(axis=1) / count
-    return np.sqrt(factor * np.maximum(beyond, 0.1 * total))
-
-
-def _correlation(standard: list[np.ndarray], specimens: int) -> np.ndarray:
-    k = len(ALL)
-    total, count = np.zeros((k, k)), np.zeros((k, k))
-    for wave in standard:
-        known = np.isfinite(wave)
-        value = np.where(known, wave, 0.0)
-        total += value @ value.T
-        count += known.astype(float) @ known.T
-    moment = total / np.maximum(count, 1)
-    scale = np.sqrt(np.diag(moment))
-    scale = np.where(scale > 0, scale, 1.0)
-    kept = specimens / (specimens + k)
-    return kept * moment / np.outer(scale, scale) * (1 - np.eye(k)) + np.eye(k)
-
-
-def _length(sights: list[Sight], standard: list[np.ndarray], heard: list[np.ndarray]) -> float:
-    """The length (m) whose exponential is nearest to the products of amplitudes at two stations.
-
-    Amplitudes (k, s) of unit variance count by the share (k, s) of what is heard that is not noise.
-    """
-    apart, product, weight = [], [], []
-    for sight, wave, loud in zip(sights, standard, heard, strict=True):
-        row, column = np.triu_indices(sight.cmod.size, 1)
-        both, sure = wave[:, row] * wave[:, column], loud[:, row] * loud[:, column]
-        known = np.isfinite(both)
-        apart.append(np.broadcast_to(np.abs(sight.cmod[row] - sight.cmod[column]), both.shape)[known])
-        product.append(both[known])
-        weight.append(sure[known])
-    distance, found, loud = (np.concatenate(x) for x in (apart, product, weight))
-    wrong = [np.sum(loud * (found - np.exp(-distance / length)) ** 2) for length in LENGTHS]
-    return float(LENGTHS[int(np.argmin(wrong))])
+def hats(progress: np.ndarray) -> np.ndarray:
+    """Weights (s, knots) of the knots at CMOD over CMOD at peak (s,): in proportion to it before the first."""
+    early = np.minimum(progress / KNOTS[0], 1.0)
+    place = np.log(np.clip(progress, KNOTS[0], KNOTS[-1]))
+    return early[:, None] * np.column_stack([np.interp(place, np.log(KNOTS), one) for one in np.eye(KNOTS.size)])

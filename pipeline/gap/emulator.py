@@ -17,6 +17,7 @@ from pipeline.gap.response import Abscissae, Response, continued, split
 from pipeline.inverse.surrogate import LagrangeSurrogate
 
 MARGIN = 0.1  # of the grid's width, by which parameters may leave it
+RASTER = 0.08  # of the logarithm of parameters: signatures are simulated at places so far apart
 SHIFTS = (0.85, 1.0, 1.15)  # of the stations: data that a shift along the CMOD would lose are left out for all alike
 
 
@@ -108,6 +109,10 @@ class Emulator:
     def inner(self) -> np.ndarray:
         """Bounds in the middle of the outermost cells of the grid; (2, 2)."""
         return np.array([((x[0] + x[1]) / 2, (x[-2] + x[-1]) / 2) for x in (self.f_max, self.delta_max)])
+
+    def rounded(self, parameters: np.ndarray) -> np.ndarray:
+        """Parameters (2,) at the nearest of so few places that tests of one specimen share what is simulated there."""
+        return np.exp(RASTER * np.rint(np.log(parameters) / RASTER))
 
     def response(self, parameters: np.ndarray, physics: Mapping[str, float]) -> Response:
         """What a simulation would say."""

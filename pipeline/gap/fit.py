@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -16,7 +17,7 @@ COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH 
 STARTS = 3  # nodes along each of two or more amplitudes, to start from
 FAR = np.array([6.0, 7.0, 8.0, 10.0, 13.0, 18.0, 25.0])  # further nodes, for tempered likelihoods
 CHORDS, SETTLED = 8, 1e-2  # steps of the parameters at a node, until χ² falls by less
-RULER = {2: 15, 3: 7}  # nodes along each principal axis of so many amplitudes; 5 of more
+RULER = {2: 11, 3: 7}  # nodes along each principal axis of so many amplitudes; 5 of more
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,8 @@ def fit(candidate: Candidate, data: Data, start: np.ndarray | None = None) -> Fi
     best = best_point(candidate, data, start)
     at, square, jacobian, residual = best
     nodes, log_area = _nodes(candidate, data, best)
-    profiles = np.array([_profile(candidate, data, best, node) for node in nodes])
+    profile = _profile(candidate, data, best)
+    profiles = np.array([profile(node) for node in nodes])
     log_measure = candidate.log_prior(nodes) + log_area
     log_posterior = profiles + log_measure
     total = float(logsumexp(log_posterior))
@@ -217,8 +219,8 @@ def climbed(candidate: Candidate, data: Data, at: np.ndarray, turns: int = 12) -
     return at, float(residual @ residual), slopes, residual
 
 
-def _profile(candidate: Candidate, data: Data, best: Point, node: np.ndarray) -> float:
-    """log ∫ likelihood over the parameters by Laplace, the amplitudes held at a node.
+def _profile(candidate: Candidate, data: Data, best: Point) -> Callable[[np.ndarray], float]:
+    """log ∫ likelihood over the parameters by Laplace, as a function of the amplitudes held.
 
     The parameters follow by chords, with the derivatives of the best point, in which they are nearly linear.
     """
@@ -226,21 +228,27 @@ def _profile(candidate: Candidate, data: Data, best: Point, node: np.ndarray) ->
     q = len(data.box)
     free, bound = slopes[:, :q], slopes[:, q:]
     solve = np.linalg.pinv(free * data.width, rcond=1e-9) * data.width[:, None]
-    here = np.append(at[:q] - solve @ (bound @ (node - at[q:])), node)
-    here[:q] = np.clip(here[:q], *data.box.T)
-    residual = data.residual(candidate, here)
-    for _ in range(CHORDS):
-        moved = here.copy()
-        moved[:q] = np.clip(here[:q] + solve @ residual, *data.box.T)
-        left = data.residual(candidate, moved)
-        gained = residual @ residual - left @ left
-        if gained <= 0:
-            break
-        here, residual = moved, left
-        if gained < SETTLED:
-            break
+    follow = solve @ bound
     _, determinant = np.linalg.slogdet(free.T @ free)
-    return float(-0.5 * residual @ residual + 0.5 * q * np.log(2 * np.pi) - 0.5 * determinant)
+    constant = 0.5 * q * float(np.log(2 * np.pi)) - 0.5 * float(determinant)
+
+    def profile(node: np.ndarray) -> float:
+        here = np.append(at[:q] - follow @ (node - at[q:]), node)
+        here[:q] = np.clip(here[:q], *data.box.T)
+        residual = data.residual(candidate, here)
+        for _ in range(CHORDS):
+            moved = here.copy()
+            moved[:q] = np.clip(here[:q] + solve @ residual, *data.box.T)
+            left = data.residual(candidate, moved)
+            gained = residual @ residual - left @ left
+            if gained <= 0:
+                break
+            here, residual = moved, left
+            if gained < SETTLED:
+                break
+        return data.metric.log_likelihood(residual) + constant
+
+    return profile
 
 
 def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, np.ndarray]:

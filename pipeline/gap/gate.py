@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import stats
@@ -21,10 +21,12 @@ class Gate:
     ----------
     ratio : mode → χ² over its degrees of freedom
     limit : mode → what a complete model exceeds in one of a hundred tests, all modes together
+    freedom : mode → degrees of freedom
     """
 
     ratio: dict[str, float]
     limit: dict[str, float]
+    freedom: dict[str, int] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[str, ...]:
@@ -70,26 +72,27 @@ def mode_operators(observation: Observation) -> dict[str, np.ndarray]:
     return found
 
 
-def gate(observation: Observation, residual: np.ndarray, covariance: np.ndarray, samples: int) -> Gate:
+def gate(observation: Observation, residual: np.ndarray, covariance: np.ndarray, tail: float) -> Gate:
     """Judge what the best candidate leaves.
 
-    χ²ₘ = bᵀ C⁺ b of the mode's amplitudes b, C their covariance. As Σ was learnt from few specimens, χ² over degrees
-    of freedom follows F rather than χ² (Hotelling 1931); the share of false refusals is divided among the modes.
+    χ²ₘ = bᵀ C⁺ b of the mode's amplitudes b, C their covariance. As Σ was learnt from few specimens, and these differ
+    in how much they differ, χ² over degrees of freedom follows F rather than χ² (Hotelling 1931); the share of false
+    refusals is divided among the modes.
 
     Parameters
     ----------
     observation : Observation
     residual : (n,) array; data − prediction of the best candidate, in the units of the data
     covariance : (n, n) array Σ
-    samples : int; specimens behind the discrepancy
+    tail : float; second degrees of freedom of F
     """
     operators = mode_operators(observation)
-    ratio, limit = {}, {}
+    ratio, limit, count = {}, {}, {}
     for mode, operator in operators.items():
         square, freedom = _quadratic(operator @ residual, operator @ covariance @ operator.T)
-        ratio[mode] = square / freedom
-        limit[mode] = float(stats.f.ppf(1 - RARE / len(operators), freedom, max(samples, 3)))
-    return Gate(ratio, limit)
+        ratio[mode], count[mode] = square / freedom, freedom
+        limit[mode] = float(stats.f.ppf(1 - RARE / len(operators), freedom, tail))
+    return Gate(ratio, limit, count)
 
 
 def _quadratic(value: np.ndarray, covariance: np.ndarray) -> tuple[float, int]:

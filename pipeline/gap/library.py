@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
 
@@ -13,9 +14,11 @@ import numpy as np
 from pipeline.core.errors import InputError
 from pipeline.core.units import MM, UM
 from pipeline.gap.discrepancy import ALL, Discrepancy
+from pipeline.gap.modes import LOAD
 from pipeline.gap.observation import Observation
 
-FILE, FORMAT = "library.json", 1
+FILE, FORMAT = "library.json", 2
+SIZES = np.where([mode == LOAD for mode in ALL], 1e-2, UM)  # units of amplitudes in the file: µm, per cent of the load
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,10 @@ class Entry:
     discrepancy : Discrepancy
     temperature : float, at least 1
     tests : int; blind tests behind the temperature, 0: not calibrated
-    check : mode → χ² over degrees of freedom of left-out specimens
+    check : mode → χ² over degrees of freedom of left-out specimens, at each one's own scale
+    freedom : float; second degrees of freedom of F that left-out specimens follow, for the gate
+    parameters : "f_max", "delta_max" → mean and standard deviation of log(identified/true) of the specimens
+    seeds : (first, last) of the specimens
     """
 
     domain: Domain
@@ -54,6 +60,9 @@ class Entry:
     temperature: float
     tests: int
     check: Mapping[str, float]
+    freedom: float = 20.0
+    parameters: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    seeds: tuple[int, int] = (0, 0)
 
     def warnings(self, geometry: str, radius: float, observation: Observation) -> list[str]:
         """What of a test lies outside the domain; one sentence each."""
@@ -75,6 +84,13 @@ class Entry:
                     f"noise of {typical / UM:.3g} µm: the library holds for {d.noise[0] / UM:.3g} to "
                     f"{d.noise[1] / UM:.3g} µm"
                 )
+        if self.parameters:
+            (strength, s_std), (opening, o_std) = (self.parameters[n] for n in ("f_max", "delta_max"))
+            found.append(
+                "tests of another engine that lack nothing are identified with f_max "
+                f"{np.expm1(strength):+.0%} ± {s_std:.0%} and delta_max {np.expm1(opening):+.0%} ± {o_std:.0%} off the "
+                "truth: the parameters are known no better"
+            )
         if self.tests == 0:
             found.append("probabilities are not calibrated on blind tests: take them as too sure")
         return found
@@ -121,24 +137,36 @@ def _entry(raw: Mapping[str, Any]) -> Entry:
         d["cmod_mm"] * MM,
         (d["noise_um"][0] * UM, d["noise_um"][1] * UM),
     )
-    amplitude = np.array(raw["amplitude_um"]) * UM
-    amplitude = np.vstack([amplitude, raw["amplitude_load"]])
     discrepancy = Discrepancy(
-        amplitude,
+        np.array(raw["amplitude_um"]) * SIZES[:, None],
         np.array(raw["correlation"]),
         np.array(raw["remainder_um"]) * UM,
         raw["length_mm"] * MM,
         raw["spread_mm"] * MM,
         raw["samples"],
         np.array(raw["white_um"]) * UM,
+        np.array(raw["waves_um"]) * SIZES[:, None],
+        raw["empirical"],
+        raw["tail"] or np.inf,
     )
-    return Entry(domain, discrepancy, raw["temperature"], raw["tests"], raw["check"])
+    return Entry(
+        domain,
+        discrepancy,
+        raw["temperature"],
+        raw["tests"],
+        raw["check"],
+        raw["freedom"],
+        {name: (one, two) for name, (one, two) in raw["parameters"].items()},
+        (raw["seeds"][0], raw["seeds"][1]),
+    )
 
 
 def written(entries: list[Entry], told: Mapping[str, Any]) -> str:
     """The text of the file; `told` says how it was made."""
     raw = {"format": FORMAT, "modes": list(ALL), "made": dict(told), "entries": [_raw(e) for e in entries]}
-    return json.dumps(raw, indent=1) + "\n"
+    return (
+        re.sub(r"\n\s+(?=-?[\d.])|(?<=[\d.])\n\s+(?=\])", " ", json.dumps(raw, indent=1)) + "\n"
+    )  # one line a row of numbers
 
 
 def _raw(entry: Entry) -> dict[str, Any]:
@@ -150,15 +178,20 @@ def _raw(entry: Entry) -> dict[str, Any]:
             "cmod_mm": d.cmod / MM,
             "noise_um": [s / UM for s in d.noise],
         },
-        "amplitude_um": np.round(x.amplitude[:-1] / UM, 4).tolist(),
-        "amplitude_load": np.round(x.amplitude[-1], 6).tolist(),
+        "amplitude_um": np.round(x.amplitude / SIZES[:, None], 4).tolist(),
         "correlation": np.round(x.correlation, 4).tolist(),
         "remainder_um": np.round(x.remainder / UM, 4).tolist(),
         "white_um": np.round(x.white / UM, 4).tolist(),
         "length_mm": round(x.length / MM, 4),
         "spread_mm": x.spread / MM,
         "samples": x.samples,
+        "seeds": list(entry.seeds),
+        "empirical": x.empirical,
+        "tail": x.tail if np.isfinite(x.tail) else None,
+        "freedom": round(entry.freedom, 3),
+        "parameters": {name: [round(v, 4) for v in both] for name, both in entry.parameters.items()},
         "temperature": round(entry.temperature, 4),
         "tests": entry.tests,
         "check": {mode: round(value, 3) for mode, value in entry.check.items()},
+        "waves_um": np.round(x.waves / SIZES[:, None], 2).tolist(),
     }

@@ -6,40 +6,72 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, eigh, solve_triangular
+from scipy.special import gammaincinv, logsumexp
 
 from pipeline.core.errors import InputError
+
+SCALES = 12  # values of the unknown scale over which a likelihood is averaged
 
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """A covariance Σ = L Lᵀ.
+    """A covariance Σ = N + S of data, of which S may be known but for its scale.
+
+    Where `tail` is finite, S stands for S tail/χ² with χ² of `tail` degrees of freedom: where N is small, differences
+    follow the multivariate Student distribution.
 
     Parameters
     ----------
-    covariance : (n, n) array, positive definite
+    covariance : (n, n) array Σ, positive definite
+    uncertain : (n, n) array S, None: nothing
+    tail : float; degrees of freedom, inf: the scale of S is known
     """
 
     covariance: np.ndarray
+    uncertain: np.ndarray | None = None
+    tail: float = np.inf
 
     @cached_property
-    def _inverse(self) -> np.ndarray:
-        """L⁻¹ (n, n)."""
+    def _root(self) -> tuple[np.ndarray, np.ndarray]:
+        """L⁻¹ (n, n) with L Lᵀ = Σ, and the share (n,) of S in the variance of each of its rows' components.
+
+        Rows are joint eigenvectors of Σ and S where S is of unknown scale, so that another scale is another length of
+        the components only.
+        """
         try:
-            root = cholesky(self.covariance, lower=True)
+            if self.uncertain is None or not np.isfinite(self.tail):
+                root = cholesky(self.covariance, lower=True)
+                return solve_triangular(root, np.eye(len(root)), lower=True), np.zeros(len(root))
+            size, shape = eigh(self.uncertain, self.covariance)
         except np.linalg.LinAlgError:
             raise InputError(
                 "the covariance of the data is not positive definite: give noise above zero to all of them"
             ) from None
-        return solve_triangular(root, np.eye(len(root)), lower=True)
+        return shape.T, np.clip(size, 0.0, 1.0)
 
     def white(self, values: np.ndarray) -> np.ndarray:
         """L⁻¹ times values (n,) or (n, k): independent, of standard deviation one."""
-        return self._inverse @ values
+        return self._root[0] @ values
+
+    def log_likelihood(self, residual: np.ndarray) -> float:
+        """Logarithm of the density of a white residual (n,), but for a constant of the metric.
+
+        −χ²/2 where the scale is known; else the mean over as many equally probable values of the variance's factor.
+        """
+        share = self._root[1]
+        if not share.any():
+            return float(-0.5 * residual @ residual)
+        middle = (np.arange(SCALES) + 0.5) / SCALES
+        factor = self.tail / (2 * gammaincinv(self.tail / 2, middle))[:, None]  # of S
+        variance = 1 + share * (factor - 1)
+        terms = -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=1)
+        return float(logsumexp(terms) - np.log(SCALES))
 
     def part(self, keep: np.ndarray) -> Metric:
         """The metric of some of the data, (n,) bool."""
-        return Metric(self.covariance[np.ix_(keep, keep)])
+        some = np.ix_(keep, keep)
+        return Metric(self.covariance[some], None if self.uncertain is None else self.uncertain[some], self.tail)
 
     @property
     def std(self) -> np.ndarray:

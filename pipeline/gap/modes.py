@@ -12,6 +12,8 @@ CRACK = ("opening", "crack rotation", "sliding")
 MODES = (*RIGID, *STRAIN, *CRACK)
 REMAINDER, LOAD = "remainder", "load"
 GROUPS = {m: g for g, ms in (("rigid", RIGID), ("strain", STRAIN)) for m in ms} | {m: m for m in CRACK}
+EVEN = ("shift along y", "strain along x", "strain along y", "opening", "crack rotation", LOAD)  # mirrored: the same
+MIRRORED = np.array([1.0 if m in EVEN else -1.0 for m in (*MODES, LOAD)])  # what the mirror image of a specimen has
 ARM = 10e-3  # m; rotations and strains are counted by the displacement they give at this distance from the tip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -49,6 +50,7 @@ class Simulator:
     workers : int or None
     progress : Progress
     spent : list of float; seconds of every call
+    executor : Executor or None; None: processes of its own for every call
     """
 
     model: Model
@@ -61,6 +63,7 @@ class Simulator:
     workers: int | None
     progress: Progress
     spent: list[float] = field(default_factory=list)
+    executor: Executor | None = None
 
     def problem(self, run: Run) -> Problem:
         """The test of one run."""
@@ -86,7 +89,10 @@ class Simulator:
         names = {k: _name(run) for k, run in zip(keys, runs, strict=True)}
         failed: dict[str, BaseException] = {}
         try:
-            run_all(self.engine.solve, wanted, self.store, workers=self.workers, progress=self.progress, names=names)
+            run_all(
+                self.engine.solve, wanted, self.store, executor=self.executor, workers=self.workers,
+                progress=self.progress, names=names,
+            )  # fmt: skip
         except SimulationError as error:
             failed = error.failures
         outcomes: list[Outcome] = []

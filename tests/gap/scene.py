@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.gap.diagnosis import Run
-from pipeline.gap.discrepancy import ALL, Discrepancy
+from pipeline.gap.discrepancy import ALL, KNOTS, Discrepancy
 from pipeline.gap.effects import effect
 from pipeline.gap.library import Domain, Entry
 from pipeline.gap.observation import Observation, Reading, Sight
@@ -54,7 +54,7 @@ def response(parameters: np.ndarray, at: np.ndarray, points: np.ndarray) -> tupl
 
 def discrepancy(level: float = 1.0) -> Discrepancy:
     """A few micrometres and per cent, as two engines differ."""
-    amplitude = level * np.full((len(ALL), 3), 2e-6)
+    amplitude = level * np.full((len(ALL), KNOTS.size), 2e-6)
     amplitude[-1] = level * 0.03
     return Discrepancy(amplitude, np.eye(len(ALL)), level * np.full(3, 0.5e-6), 0.4e-3, samples=20)
 
