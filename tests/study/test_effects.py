@@ -18,6 +18,7 @@ from pipeline.store.bundle import read_bundle
 from pipeline.store.creep import CreepRecord
 from pipeline.store.new import Contents, write_bundle
 from pipeline.study.assembly import Model, build_model
+from pipeline.study.diagnose import unlearnt
 from pipeline.study.effects import Band, held_to, lattice_problem, physics_effects, planned, settled
 from tests.helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment, edit
 
@@ -206,6 +207,11 @@ def test_bonds_outside_the_band_neither_open_nor_slide(sliding_model):
     assert np.array_equal(np.isinf(found.f_max), np.isinf(found.f_shear))
     assert np.isinf(found.f_max).any()
     assert np.isfinite(found.f_max).any()
+
+
+def test_the_diagnosis_warns_of_bonds_that_its_library_does_not_know(model, sliding_model):
+    assert unlearnt(model) == []
+    assert "poissons_ratio = 0.15" in unlearnt(sliding_model)[0]
 
 
 def test_damage_at_the_tip_is_refused_where_bonds_carry_shear(sliding_model):
