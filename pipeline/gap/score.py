@@ -30,6 +30,10 @@ class Scored:
         """Labels, the most probable first."""
         return sorted(self.probability, key=lambda label: (-self.probability[label], label))
 
+    def part(self, name: str) -> float:
+        """Probability that an effect takes part, alone or with others."""
+        return float(sum(p for label, p in self.probability.items() if name in label.split(" + ")))
+
     def credible(self, share: float = 0.9) -> list[str]:
         """The fewest labels whose probabilities sum to the share."""
         found, total = [], 0.0

@@ -53,11 +53,11 @@ def together(tests: Sequence[Test], rng: np.random.Generator) -> Together:
     rng : numpy Generator; of bootstrap and floor
     """
     names = sorted(set.intersection(*(set(t.diagnosis.card.names) for t in tests)))
-    singles = _scored(tests, [NONE, *names], len(names))
+    singles = scored_together(tests, [NONE, *names], len(names))
     wanted = [*pairs(singles), *_pairs_of_all(tests)]
     tests = tuple(_with_pairs(t, wanted) for t in tests)
     labels = [NONE, *names, *dict.fromkeys(" + ".join(p) for p in wanted)]
-    scored = _scored(tests, labels, len(names))
+    scored = scored_together(tests, labels, len(names))
     card, gate = pooled_card([t.diagnosis.card for t in tests], names), pooled_gate([t.diagnosis.gate for t in tests])
     best = [label for label in scored.ranked() if label != NONE][:TOLD]
     return Together(
@@ -71,12 +71,20 @@ def together(tests: Sequence[Test], rng: np.random.Generator) -> Together:
     )
 
 
-def _scored(tests: Sequence[Test], labels: Sequence[str], effects: int) -> Scored:
-    """Probabilities from the median log Bayes factors of labels that all tests have."""
-    found = pooled([{label: t.diagnosis.scored.log_bayes[label] for label in labels} for t in tests])
+def scored_together(tests: Sequence[Test], labels: Sequence[str], effects: int) -> Scored:
+    """Probabilities from the median log Bayes factors of labels that all tests have.
+
+    Counted from the label that no other beats in the median: where none is hopeless, log Bayes factors against it
+    differ by hundreds from test to test, and medians of two labels may come from two tests.
+    """
+    each = [t.diagnosis.scored.log_bayes for t in tests]
+    rows = np.array([[one[label] for one in each] for label in labels])
+    ahead = np.median(rows[:, None] - rows, axis=2).min(axis=1)
+    best = rows[int(np.argmax(ahead))]
+    found = pooled([dict(zip(labels, row, strict=True)) for row in (rows - best).T])
     members = {label: 0 if label == NONE else label.count(" + ") + 1 for label in labels}
     temperature = max(t.diagnosis.scored.temperature for t in tests)
-    return from_bayes({label: found[label] for label in labels}, members, effects, temperature)
+    return from_bayes({label: found[label] - found[NONE] for label in labels}, members, effects, temperature)
 
 
 def _pairs_of_all(tests: Sequence[Test]) -> list[tuple[str, ...]]:

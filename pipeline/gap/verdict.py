@@ -58,4 +58,7 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
         return Verdict(CLASS, mates, f"one of these has probability {together:.2f}; these data do not tell them apart")
     credible = [label for label in scored.credible() if label != NONE]
     named = tuple(dict.fromkeys(n for label in credible for n in label.split(" + ")))
-    return Verdict(ONE_OF, named, f"no single one reaches {SURE}; these hold 90 % of the probability")
+    told = f"no single one reaches {SURE}; these hold 90 % of the probability"
+    sure = [n for n in named if scored.part(n) >= SURE]
+    told += "".join(f"; {n} takes part, alone or with others, with {scored.part(n):.2f}" for n in sure)
+    return Verdict(ONE_OF, named, told)

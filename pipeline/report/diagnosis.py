@@ -102,14 +102,15 @@ def ranking(
 ) -> Axes:
     """Probabilities of the best explanations; of every test by itself as points, where there are several."""
     rows = sorted(probability.items(), key=lambda item: -item[1])[:most][::-1]
-    bars = axes.barh([_broken(n) for n, _ in rows], [p for _, p in rows],
+    axes.barh([_broken(n) for n, _ in rows], [p for _, p in rows],
                      color=[GREY if n == "none" else BLUE for n, _ in rows])  # fmt: skip
-    axes.bar_label(bars, [f"{p:.2f}" if p >= 0.005 else "<0.01" for _, p in rows], padding=2, fontsize=6)
+    for place, (_, p) in enumerate(rows):
+        axes.text(1.2, place, f"{p:.2f}" if p >= 0.005 else "<0.01", ha="right", va="center", fontsize=6)
     for points in (each or {}).values():
         axes.plot([points.get(n, np.nan) for n, _ in rows], range(len(rows)), "o", mfc="none", color=BLACK, ms=3.5)
     axes.axvline(0.8, color=VERMILION, linewidth=0.8, linestyle="--")
     axes.tick_params(axis="y", labelsize=6.5)
-    axes.set(xlabel="probability (dashed: from here a cause is named)", xlim=(0, 1.08))
+    axes.set(xlabel="probability (dashed: a cause is named)", xlim=(0, 1.2), xticks=np.linspace(0, 1, 6))
     return axes
 
 

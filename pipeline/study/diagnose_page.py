@@ -32,6 +32,7 @@ from pipeline.study.pages import picture, write_page
 
 WIDE = {"width": 190.0, "height": 66.0}  # mm
 CALLED = {NONE: "model as it is"}
+MOST = 2.0  # share of a gap that is written in full
 CELLS = 4  # of the table of where, in words
 SPEAKS = 0.5  # log Bayes factor, either way, from which data say something of an effect
 
@@ -134,8 +135,13 @@ def closed(label: str, c: Mapping[str, Any]) -> str:
     called = CALLED.get(label, label)
     if c["nothing_to_close"]:
         return f"{called}: nothing to close, the model as it is lies within what engines differ by"
-    low, high = c["interval_95"]
-    return f"{called} closes {c['fraction']:.0%} of the gap on data not used for it (95 %: {low:.0%} to {high:.0%})"
+    low, high = (percent(x) for x in c["interval_95"])
+    return f"{called} closes {percent(c['fraction'])} of the gap on data not used for it (95 %: {low} to {high})"
+
+
+def percent(share: float) -> str:
+    """A share that may be anything where there is little to close: beyond twice the whole its size says nothing."""
+    return f"{'<' if share < -MOST else '>' if share > MOST else ''}{np.clip(share, -MOST, MOST):.0%}"
 
 
 def _where(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
@@ -274,7 +280,7 @@ def _how_far(case: Case, d: Diagnosis, result: Mapping[str, Any]) -> Section:
 
 def closure_row(label: str, c: Mapping[str, Any]) -> Number:
     """Closure of one explanation on held-out data, channel by channel, in µm and N."""
-    value = "nothing to close" if c["nothing_to_close"] else f"{c['fraction']:.0%}"
+    value = "nothing to close" if c["nothing_to_close"] else percent(c["fraction"])
     parts = []
     for channel, key, unit in (("field", "displacement_um", "µm"), ("load", "load_n", "N")):
         before, after = c["before"][key], c["after"][key]
@@ -282,9 +288,9 @@ def closure_row(label: str, c: Mapping[str, Any]) -> Number:
             continue
         share = c.get("channels", {}).get(channel)
         closed_ = "" if share is None else (" (nothing to close)" if share["fraction"] is None else
-                                            f" ({share['fraction']:.0%})")  # fmt: skip
+                                            f" ({percent(share['fraction'])})")  # fmt: skip
         parts.append(f"{channel} {before:.3g} → {after:.3g} {unit}{closed_}")
-    interval = "" if c["nothing_to_close"] else "95 %: {:.0%} to {:.0%}; ".format(*c["interval_95"])
+    interval = "" if c["nothing_to_close"] else "95 %: {} to {}; ".format(*map(percent, c["interval_95"]))
     return Number(label, value, interval + "; ".join(parts))
 
 

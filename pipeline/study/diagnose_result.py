@@ -38,6 +38,7 @@ def diagnosis_result(
         "reason": d.verdict.reason,
         "probability": dict(sorted(d.scored.probability.items(), key=lambda item: -item[1])),
         "log_bayes": dict(d.scored.log_bayes),
+        "takes_part": {n: d.scored.part(n) for n in d.card.names},
         "temperature": d.scored.temperature,
         "set_90": d.scored.credible(),
         "equivalence_classes": [list(c) for c in d.card.classes],

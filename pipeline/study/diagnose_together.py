@@ -61,6 +61,7 @@ def together_result(cases: Mapping[str, Case], joint: Together) -> dict[str, Any
         "reason": j.verdict.reason,
         "probability": dict(sorted(j.scored.probability.items(), key=lambda item: -item[1])),
         "log_bayes": dict(j.scored.log_bayes),
+        "takes_part": {n: j.scored.part(n) for n in j.card.names},
         "temperature": j.scored.temperature,
         "set_90": j.scored.credible(),
         "equivalence_classes": [list(c) for c in j.card.classes],
@@ -219,4 +220,6 @@ def _carried(rows: Sequence[Transfer]) -> str:
     if not closed:
         return "nothing to close on the other tests"
     low, high = min(closed), max(closed)
-    return f"fitted to the other tests it closes {low:.0%} to {high:.0%} of the gap of {len(closed)} of {len(rows)}"
+    return (
+        f"fitted to the other tests it closes {low:.0%} to {high:.0%} of the gap of {len(closed)} of {len(rows)} tests"
+    )

@@ -119,6 +119,8 @@ def _curves(folder: Path, joint: Together) -> Figure:
 def _curve(axes: Any, test: Test, best: str) -> Any:
     d = test.diagnosis
     labels = dict.fromkeys((NONE, best))
-    curves = {CALLED.get(n, f"with {n}"): whole_curve(d, d.fits[n]) for n in labels}
+    curves = {CALLED.get(n, "with it"): whole_curve(d, d.fits[n]) for n in labels}
+    loads(axes, d.observation, curves, None, load_std(d))
+    axes.get_legend().set_loc("upper right")
     axes.set_title(test.name)
-    return loads(axes, d.observation, curves, None, load_std(d))
+    return axes

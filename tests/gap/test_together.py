@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.gap.diagnosis import diagnose
 from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import Card
-from pipeline.gap.together import pooled_card, together
+from pipeline.gap.together import pooled_card, scored_together, together
 from pipeline.gap.transfer import OTHER, REPLICATE, Test
 from tests.gap.scene import ABSCISSAE, START, entry, measured, simulate
 
@@ -58,6 +60,21 @@ def test_one_odd_specimen_does_not_raise_an_alarm():
     assert found.scored.log_bayes[GIVES] == pytest.approx(
         np.median([t.diagnosis.scored.log_bayes[GIVES] for t in tests])
     )
+
+
+def told(test: Test, **log_bayes: float) -> Test:
+    """The same test as if it had said this."""
+    d = test.diagnosis
+    return replace(test, diagnosis=replace(d, scored=replace(d.scored, log_bayes={**d.scored.log_bayes, **log_bayes})))
+
+
+def test_explanations_that_beat_none_by_far_are_held_against_each_other(giving):
+    """Each test prefers the gauge to the modulus a little; against none both are far ahead, differently far."""
+    said = [{"cmod_gain": 105.0, "modulus": 104.0}, {"cmod_gain": 305.0, "modulus": 302.0}]
+    tests = [told(t, **x) for t, x in zip(giving, [*said, {"cmod_gain": 250.0, "modulus": 245.0}], strict=True)]
+    found = scored_together(tests, ["none", "cmod_gain", "modulus"], 2).log_bayes
+    assert found["cmod_gain"] == pytest.approx(250.0)
+    assert found["cmod_gain"] - found["modulus"] == pytest.approx(3.0)  # of 1, 3 and 5; medians of each differ by 5
 
 
 def test_what_belongs_to_one_set_up_is_not_carried_to_another():

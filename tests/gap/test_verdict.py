@@ -173,6 +173,16 @@ def test_data_that_show_nothing_are_not_praised():
     assert "show no effect" not in verdict(flat, cards(), OPEN).reason
 
 
+def test_one_that_takes_part_in_all_explanations_is_said_to():
+    log_bayes = {NONE: 0.0, "effect 0": 9.0, "effect 0 + effect 1": 10.5}
+    scored = from_bayes(log_bayes, {NONE: 0, "effect 0": 1, "effect 0 + effect 1": 2}, 3)
+    assert max(scored.probability.values()) < 0.8 < scored.part("effect 0")
+    found = verdict(scored, cards(), OPEN)
+    assert found.kind == ONE_OF
+    assert "effect 0 takes part" in found.reason
+    assert "effect 1 takes part" not in found.reason
+
+
 def test_the_verdict_does_not_hang_on_names():
     """The same data under permuted names: the same probabilities, permuted."""
     base, columns = library()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.study.diagnose_page import amount, closure_row, likely, next_section, verdict_section, where_told
+from pipeline.study.diagnose_page import amount, closure_row, likely, next_section, percent, verdict_section, where_told
 
 
 def share(fraction: float | None) -> dict[str, Any]:
@@ -73,6 +73,10 @@ def test_closure_stands_in_micrometres_and_newtons_by_channel():
 
 def test_sizes_have_units_but_ratios_none():
     assert [amount(0.5, "1"), amount(3.0, "mm"), amount(None, "mm")] == ["0.5", "3 mm", "–"]
+
+
+def test_shares_of_next_to_nothing_are_cut():
+    assert [percent(x) for x in (0.987, -0.5, 12.0, -9.3)] == ["99%", "-50%", ">200%", "<-200%"]
 
 
 def test_the_cells_that_stand_out_are_told_in_words():
