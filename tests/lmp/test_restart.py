@@ -113,6 +113,27 @@ def test_runs_may_be_cut_anywhere(name: str, tmp_path: Path, monkeypatch: pytest
     assert (again == whole).all(), (again, whole)
 
 
+def test_bonds_creep_by_the_simulation_once_the_drive_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Particles that nothing moves relax by the steps of the run; the time of the test before does not count."""
+    problem = tiny_beam(accuracy=0.3, **OTHERS["creep"])
+    write_deck(tmp_path, problem)
+    monkeypatch.chdir(tmp_path)
+    with deck() as lmp:
+        lmp.commands_list(["run 300 post no", "compute still all bond/local force", "run 0 post no"])
+        assert told(lmp)[15] > 1, "the test took some seconds so far"
+        before = lmp.numpy.extract_compute("still", 2, 1).copy()
+        lmp.commands_list(["unfix drive", "run 0 post no"])
+        assert (lmp.numpy.extract_compute("still", 2, 1) == before).all(), "no time has passed"
+        lmp.command("run 10 post no")  # of 1 s each
+        after = lmp.numpy.extract_compute("still", 2, 1).copy()
+        lmp.command("run 1000 post no")
+        last = lmp.numpy.extract_compute("still", 2, 1)
+    creeps = np.abs(after - before) > 1e-3 * np.abs(before).max()
+    assert np.count_nonzero(creeps) > 20
+    # of two decaying exponentials the slower is left, its time 194 s at most: e^(-1010/194) = 0.0055
+    assert np.abs(last[creeps]).max() < 0.0055 * np.abs(before).max()
+
+
 def test_a_drive_of_another_format_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_deck(tmp_path, tiny_beam(accuracy=0.3))
     monkeypatch.chdir(tmp_path)

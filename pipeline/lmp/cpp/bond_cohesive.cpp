@@ -38,7 +38,7 @@ void BondCohesive::Part::clear()
 
 BondCohesive::BondCohesive(LAMMPS *lmp) :
     Bond(lmp), finite(false), sliding(false), nhistory(3), restored(0), history_id("COHESIVE_HISTORY"), history_index(-1),
-    theta(nullptr), torque(nullptr), built_calls(-1), built_step(-1), time_now(0.0), time_seen(NAN), time_given(false)
+    theta(nullptr), torque(nullptr), built_calls(-1), built_step(-1), time_now(0.0), time_seen(NAN), time_given(false), seen_given(false)
 {
   writedata = 1;
   comm_forward = comm_reverse = 1;    // of the rotations, where bonds slide
@@ -115,6 +115,7 @@ void BondCohesive::init_style()
   step.clear();
   for (const auto &own : law) step.emplace_back(own, 0.0);
   if (sliding) make_rotation();
+  time_given = false;    // a fix that gives it says so after this
   built_calls = -1;
 }
 
@@ -223,8 +224,10 @@ void BondCohesive::set_time(double physical)
 double BondCohesive::elapsed()
 {
   if (!time_given) time_now = update->atime + (update->ntimestep - update->atimestep) * update->dt;
-  const double passed = time_now - time_seen;    // NAN before the first
+  // NAN before the first, and where another clock goes on
+  const double passed = time_given == seen_given ? time_now - time_seen : NAN;
   time_seen = time_now;
+  seen_given = time_given;
   return passed > 0.0 ? passed : 0.0;
 }
 

@@ -46,7 +46,7 @@ class BondCohesive : public Bond {
   // for the fixes and commands that come with the style
   bool slides() const { return sliding; }
   bool creeps() const;
-  void set_time(double physical);                          // from now on, time is what the caller says
+  void set_time(double physical);                          // until the next init, time is what the caller says
   void energies(double &stored, double &dissipated);       // of this rank's bonds
   void add_stiffness(double **opening, double **turning, double share_of_sliding);
   double *rotation(const char *name) const;                // theta, omega, torque or inertia of the particles
@@ -138,7 +138,7 @@ class BondCohesive : public Bond {
   double *theta, *torque;
   bigint built_calls, built_step;
   double time_now, time_seen;
-  bool time_given;
+  bool time_given, seen_given;    // whether time is, and was, what set_time says; else that of the simulation
 };
 
 }    // namespace LAMMPS_NS
