@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.core.problem import Kinematics, Problem
 from pipeline.materials.cohesive import CentralSoftening
+from pipeline.materials.mixed_softening import MixedSoftening
 
 STRIP = 0.2  # half width of the strip over the ligament; also how far it begins behind the tip
 LARGEST = 0.5  # share of active bonds from which condensing does not pay
@@ -21,5 +22,5 @@ def strip(problem: Problem, share: float = STRIP) -> np.ndarray:
 
 def pays(problem: Problem, active: np.ndarray) -> bool:
     """Whether condensing is possible and worth its set-up."""
-    linear = problem.kinematics == Kinematics.SMALL and isinstance(problem.law, CentralSoftening)
+    linear = problem.kinematics == Kinematics.SMALL and isinstance(problem.law, CentralSoftening | MixedSoftening)
     return linear and problem.particles.count >= FEWEST and bool(np.mean(active) <= LARGEST)

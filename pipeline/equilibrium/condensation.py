@@ -1,7 +1,7 @@
 """Static condensation: what stays elastic becomes a stiffness between the variables around the crack.
 
-Bonds are *active*, followed through the law, or *far*, elastic with K^n. Variables that move a bond of the strip
-or the gauge are kept; the others are eliminated exactly (Schur complement; Guyan 1965). After every increment
+Bonds are *active*, followed through the law, or *far*, elastic with K^n and K^s. Variables that move a bond of the
+strip or the gauge are kept; the others are eliminated exactly (Schur complement; Guyan 1965). After every increment
 the far bonds are looked at: one that would have been damaged becomes active, as an island or in a wider strip.
 """
 
@@ -14,6 +14,7 @@ from scipy import linalg, sparse
 from scipy.linalg.blas import dsymv
 from scipy.sparse.linalg import SuperLU, splu
 
+from pipeline.core.problem import BondLaw
 from pipeline.equilibrium.assembly import Assembly, assembly
 from pipeline.equilibrium.cholesky import Plan, available
 from pipeline.equilibrium.factor import Solve, factorise, rough_solve
@@ -22,7 +23,8 @@ from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
 from pipeline.materials.cohesive import CentralSoftening
-from pipeline.materials.memory import CentralMemory
+from pipeline.materials.memory import CentralMemory, MixedMemory, at_rest
+from pipeline.materials.mixed_softening import MixedSoftening
 
 ROUND_OFF = 1e-9  # of K^n: below, a bond counts as elastic in the stiffness that steps are measured by
 
@@ -39,6 +41,7 @@ class CondensedNetwork:
     islands : Islands
     assembly : Assembly of the strip's bonds and the support
     plan : Plan of their factorisation; None where the compiled library is missing
+    order : (k,) int array; where each deformation stands when those of the strip come before those of the islands
     """
 
     bonds: SmallNetwork
@@ -47,6 +50,7 @@ class CondensedNetwork:
     islands: Islands
     assembly: Assembly
     plan: Plan | None
+    order: np.ndarray
 
     @property
     def kept(self) -> int:
@@ -54,9 +58,10 @@ class CondensedNetwork:
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         apart = self.islands.opening(self._moved(free, machine), free[self.kept :])
-        return np.append(self.bonds.opening(free[: self.kept], machine), apart)
+        return np.append(self.bonds.opening(free[: self.kept], machine), apart)[self.order]
 
     def pull(self, force: np.ndarray, free: np.ndarray, machine: float) -> tuple[np.ndarray, float]:
+        force = self._parted(force)
         strip, moved = self.bonds.drive.size, self._moved(free, machine)
         internal, load = self.bonds.pull(force[:strip], free[: self.kept], machine)
         carried, own = self.islands.pull(force[strip:], moved, free[self.kept :])
@@ -84,7 +89,7 @@ class CondensedNetwork:
 
     def _blocks(self, weight: np.ndarray) -> tuple[sparse.csc_array, np.ndarray]:
         """Stiffnesses of the strip and of the islands, N/m, for bonds of `weight` (m,), N/m."""
-        strip, islands = self.bonds.drive.size, self.islands
+        weight, strip, islands = self._parted(weight), self.bonds.drive.size, self.islands
         lost = np.maximum(islands.k_n - weight[strip:], 0.0)
         changed = lost > ROUND_OFF * islands.k_n
         row = np.sqrt(lost[changed, None]) * islands.row[changed, :-1]
@@ -94,6 +99,12 @@ class CondensedNetwork:
     def energy(self, free: np.ndarray, machine: float) -> float:
         moved = self._moved(free, machine)
         return 0.5 * float(moved @ self.support @ moved) + self.islands.energy(moved, free[self.kept :])
+
+    def _parted(self, values: np.ndarray) -> np.ndarray:
+        """Values (k,) of all deformations, those of the strip before those of the islands."""
+        parted = np.empty_like(values)
+        parted[self.order] = values
+        return parted
 
     def _moved(self, free: np.ndarray, machine: float) -> np.ndarray:
         """Edge and machine (b + 1,), m."""
@@ -117,7 +128,7 @@ class CondensedModel:
     strip: np.ndarray
     kept: np.ndarray
     network: CondensedNetwork
-    law: CentralSoftening
+    law: CentralSoftening | MixedSoftening
     gauge: np.ndarray
     gauge_drive: float
     far: FarField
@@ -125,13 +136,19 @@ class CondensedModel:
     @property
     def bonds(self) -> np.ndarray:
         """Numbers of the active bonds in the whole model, in the order of this one."""
-        return np.append(np.flatnonzero(self.strip), self.network.islands.index)
+        return np.append(np.flatnonzero(self.strip), self._apart)
+
+    @property
+    def _apart(self) -> np.ndarray:
+        """Numbers of the bonds that are islands."""
+        index = self.network.islands.index
+        return index[index < self.strip.size]
 
     @property
     def active(self) -> np.ndarray:
         """Which bonds (m,) bool are followed through the law."""
         chosen = self.strip.copy()
-        chosen[self.network.islands.index] = True
+        chosen[self._apart] = True
         return chosen
 
     def complete(self, free: np.ndarray, machine: float) -> np.ndarray:
@@ -144,37 +161,30 @@ class CondensedModel:
 
     def reduce(self, state: State) -> State:
         """A state of the whole model in the variables of this one."""
-        kept, bonds, islands = state.free[self.kept], self.bonds, self.network.islands
+        kept, islands, memory = state.free[self.kept], self.network.islands, _divisible_memory(state)
         moved = np.append(kept[self.network.edge], state.machine)
-        opening, reached = state.memory.opening, state.memory.reached
-        extra = opening[islands.index] - islands.opening(moved, np.zeros(islands.count))
-        memory = CentralMemory(self.law, opening[bonds], reached[bonds])
-        return replace(state, free=np.append(kept, extra), memory=memory)
+        extra = memory.deformation[islands.index] - islands.opening(moved, np.zeros(islands.count))
+        return replace(state, free=np.append(kept, extra), memory=memory.of(self.bonds))
 
     def expand(self, state: State) -> State:
         """A state of this model in the variables of the whole one; far bonds never opened farther than now."""
         free = self.complete(state.free, state.machine)
-        opening = self.whole.network.opening(free, state.machine)
-        reached = np.maximum(opening, 0.0)
-        reached[self.bonds] = state.memory.reached
-        _, law = _divisible(self.whole)
-        return replace(state, free=free, memory=CentralMemory(law, opening, reached))
+        deformation = self.whole.network.opening(free, state.machine)
+        return replace(state, free=free, memory=_among(state, self.whole.law, self.bonds, deformation))
 
     def carry(self, state: State, grown: CondensedModel) -> State:
         """A state of this model in the variables of one grown from it; its new bonds are elastic until now."""
         before, after = self.network.islands, grown.network.islands
         lost = before.tension_lost(state.free[self.kept.size :])
         extra = after.compliance[before.count :, : before.count] @ lost
-        moved = np.append(state.free[self.network.edge], state.machine)
-        opening = after.row[before.count :] @ moved + extra
-        reached = np.append(state.memory.reached, np.maximum(opening, 0.0))
-        memory = CentralMemory(grown.law, np.append(state.memory.opening, opening), reached)
-        return replace(state, free=np.append(state.free, extra), memory=memory)
+        free = np.append(state.free, extra)
+        deformation = grown.network.opening(free, state.machine)
+        return replace(state, free=free, memory=_among(state, grown.law, np.arange(self.bonds.size), deformation))
 
     def usage(self, state: State) -> np.ndarray:
-        """Opening of every far bond (m,) as a share of its δ_peak in a state of this model; 0 for active bonds."""
-        opening = self.whole.network.opening(self.complete(state.free, state.machine), state.machine)
-        return np.where(self.active, 0.0, opening / self.whole.law.delta_peak)
+        """Share (m,) of its strength that every far bond has used in a state of this model; 0 for active bonds."""
+        deformation = self.whole.network.opening(self.complete(state.free, state.machine), state.machine)
+        return np.where(self.active, 0.0, at_rest(self.whole.law).trial(0.0).usage(deformation))
 
     def grown(self, more: np.ndarray) -> CondensedModel:
         """The model with further bonds (m,) bool as islands, by one solution of the far field each."""
@@ -182,26 +192,31 @@ class CondensedModel:
         if not index.size:
             return self
         (whole, law), far, edge = _divisible(self.whole), self.far, self.network.edge
-        jacobian = whole.jacobian[index].tocsr()
+        rows, elastic = _deformations(self.whole, index), at_rest(law).trial(0.0).elastic
+        jacobian = whole.jacobian[rows].tocsr()
         inner = jacobian[:, far.inner].tocsr()
         columns = far.columns(inner.T.tocsc())
         across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsr()
-        direct = np.column_stack([jacobian[:, self.kept[edge]].toarray(), whole.drive[index]])
+        direct = np.column_stack([jacobian[:, self.kept[edge]].toarray(), whole.drive[rows]])
         row = direct - (across.T @ columns).T
-        islands = joined(self.network.islands, index, row, columns, inner, law.k_n[index])
-        law = law.of(np.append(np.flatnonzero(self.strip), islands.index))
+        islands = joined(self.network.islands, rows, row, columns, inner, elastic[rows])
         gauge = np.append(self.whole.gauge[self.kept], np.zeros(islands.count))
-        return replace(self, network=replace(self.network, islands=islands), law=law, gauge=gauge)
+        bonds = np.append(self.bonds, index)
+        first = _deformations(self.whole, np.flatnonzero(self.strip))
+        order = _places(np.append(first, islands.index), _deformations(self.whole, bonds))
+        network = replace(self.network, islands=islands, order=order)
+        return replace(self, network=network, law=law.of(bonds), gauge=gauge)
 
 
 def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     """Reduce a model with small kinematics to the variables of its active bonds (m,) bool, the strip."""
     network, law = _divisible(whole)
-    kept, inner = _divide(network, active, whole.gauge)
-    rigid = network.part(~active, np.arange(whole.gauge.size))
-    stiffness = rigid.stiffness(law.k_n[~active], whole.gauge, 0.0).tocsr()
-    pull, load = rigid.pull(law.k_n[~active] * rigid.drive, whole.gauge, 0.0)
-    kept = kept[_order(network, active, kept, stiffness)]
+    followed, rest = (_deformations(whole, np.flatnonzero(chosen)) for chosen in (active, ~active))
+    kept, inner = _divide(network, followed, whole.gauge)
+    rigid, elastic = network.part(rest, np.arange(whole.gauge.size)), at_rest(law).trial(0.0).elastic[rest]
+    stiffness = rigid.stiffness(elastic, whole.gauge, 0.0).tocsr()
+    pull, load = rigid.pull(elastic * rigid.drive, whole.gauge, 0.0)
+    kept = kept[_order(network, followed, kept, stiffness)]
     inside = stiffness[inner][:, inner].tocsc()
     factor = factorise(inside)
     far = FarField(inner, exact_solve(inside, factor), stiffness[inner][:, kept].tocsr(), pull[inner])
@@ -210,7 +225,7 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     outer = sparse.block_array([[stiffness[held][:, held], pull[held, None]], [pull[None, held], [[load]]]]).tocsc()
     across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsc()
     support = schur_complement(inside, across, outer, factor)
-    bonds = network.part(active, kept)
+    bonds = network.part(followed, kept)
     islands = no_islands(edge.size, inner.size)
     frame = assembly(bonds.jacobian, edge)
     plan = Plan(frame.stiffness(np.ones(bonds.drive.size), support[:-1, :-1])) if available() else None
@@ -218,7 +233,7 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
         whole=whole,
         strip=active,
         kept=kept,
-        network=CondensedNetwork(bonds, edge, support, islands, frame, plan),
+        network=CondensedNetwork(bonds, edge, support, islands, frame, plan, np.arange(followed.size)),
         law=law.of(active),
         gauge=whole.gauge[kept],
         gauge_drive=whole.gauge_drive,
@@ -226,18 +241,51 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     )
 
 
-def _divisible(whole: WholeModel) -> tuple[SmallNetwork, CentralSoftening]:
+def _divisible(whole: WholeModel) -> tuple[SmallNetwork, CentralSoftening | MixedSoftening]:
     """Network and law of a model that can be condensed."""
     network, law = whole.network, whole.law
-    if not isinstance(network, SmallNetwork) or not isinstance(law, CentralSoftening):
+    if not isinstance(network, SmallNetwork) or not isinstance(law, CentralSoftening | MixedSoftening):
         raise TypeError("only linear kinematics and a law that can be divided are condensed")
     return network, law
 
 
-def _divide(network: SmallNetwork, active: np.ndarray, gauge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variables to keep and to eliminate: those that move an active bond or the gauge, and the others."""
+def _divisible_memory(state: State) -> CentralMemory | MixedMemory:
+    """The bonds of a model that can be condensed."""
+    if not isinstance(state.memory, CentralMemory | MixedMemory):
+        raise TypeError("only bonds that do not creep are condensed")
+    return state.memory
+
+
+def _among(state: State, law: BondLaw, bonds: np.ndarray, deformation: np.ndarray) -> CentralMemory | MixedMemory:
+    """The bonds of a state, (k,) int among more of them with `law`, the others undamaged."""
+    memory = _divisible_memory(state)
+    if isinstance(memory, CentralMemory) and isinstance(law, CentralSoftening):
+        return memory.among(law, bonds, deformation)
+    assert isinstance(memory, MixedMemory), "a model has one law"
+    assert isinstance(law, MixedSoftening), "a model has one law"
+    return memory.among(law, bonds, deformation)
+
+
+def _deformations(whole: WholeModel, bonds: np.ndarray) -> np.ndarray:
+    """Numbers of the deformations of bonds (k,) int: all openings, then all slidings if there are any."""
+    network, _ = _divisible(whole)
+    every = whole.law.k_n.size
+    return np.concatenate([bonds + start for start in range(0, network.drive.size, every)])
+
+
+def _places(given: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Where each of the wanted numbers stands among those given, all different."""
+    sorting = np.argsort(given)
+    return sorting[np.searchsorted(given[sorting], wanted)]
+
+
+def _divide(network: SmallNetwork, followed: np.ndarray, gauge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Variables to keep and to eliminate: those that move a deformation that is followed or the gauge, and the others.
+
+    `followed` (k,) int.
+    """
     needed = gauge != 0
-    needed[network.jacobian[active].indices] = True
+    needed[network.jacobian[followed].indices] = True
     return np.flatnonzero(needed), np.flatnonzero(~needed)
 
 
@@ -264,14 +312,15 @@ def schur_complement(
     return 0.5 * (schur + schur.T)
 
 
-def _order(network: SmallNetwork, active: np.ndarray, kept: np.ndarray, far: sparse.csr_array) -> np.ndarray:
+def _order(network: SmallNetwork, followed: np.ndarray, kept: np.ndarray, far: sparse.csr_array) -> np.ndarray:
     """A good order of elimination (q,) of the kept variables, those on the edge being all coupled.
 
     `far` (all, all) is the stiffness of the other bonds.
     """
     edge = np.flatnonzero(np.diff(far[kept].indptr))
-    bonds = network.part(active, kept)
+    bonds = network.part(followed, kept)
     frame = assembly(bonds.jacobian, edge)
-    stiff = abs(bonds.jacobian).max() * active.size  # diagonally dominant: only its pattern counts
-    matrix = frame.stiffness(np.ones(bonds.drive.size), stiff * np.eye(edge.size) + 1e-9)
-    return np.argsort(factorise(matrix + stiff * sparse.eye_array(kept.size, format="csc")).perm_c)
+    # its pattern counts alone, with entries that cancel in some stiffness: ones, and a diagonal that dominates them
+    size = kept.size
+    pattern = sparse.csc_array((np.ones(frame.indices.size), frame.indices, frame.indptr), shape=(size, size))
+    return np.argsort(factorise(pattern + 2 * size * sparse.eye_array(size, format="csc")).perm_c)

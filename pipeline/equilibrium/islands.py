@@ -20,15 +20,16 @@ YIELD = 1e-6  # of 1/K^n: compliance given to every bond, for motions that the f
 
 @dataclass(frozen=True)
 class Islands:
-    """The k bonds that soften in the far field.
+    """The k openings, or openings and slidings, of the bonds that soften in the far field.
 
     Parameters
     ----------
-    index : (k,) int array; bonds, numbered in the whole model
+    index : (k,) int array; what softens, numbered as the deformations of the whole model: openings of bonds, and
+        slidings where these slide
     row : (k, b + 1) array; A and a: opening by the edge of the strip and by the machine, of the elastic far field
     compliance : (k, k) array C, m/N, and its inverse, N/m
     jacobian : (k, f) sparse array; their opening by the eliminated variables
-    k_n : (k,) array, N/m
+    k_n : (k,) array, N/m; their elastic stiffness
     """
 
     index: np.ndarray

@@ -78,6 +78,21 @@ class CentralMemory:
     def fading(self, duration: float) -> float:
         return 0.0
 
+    @property
+    def deformation(self) -> np.ndarray:
+        """Openings (m,), m."""
+        return self.opening
+
+    def of(self, bonds: np.ndarray) -> CentralMemory:
+        """Some of the bonds, (k,) int."""
+        return CentralMemory(self.law.of(bonds), self.opening[bonds], self.reached[bonds])
+
+    def among(self, law: CentralSoftening, bonds: np.ndarray, deformation: np.ndarray) -> CentralMemory:
+        """These bonds, (k,) int in a larger number with `law`; the others were never opened farther than now."""
+        reached = np.maximum(deformation, 0.0)
+        reached[bonds] = self.reached
+        return CentralMemory(law, deformation, reached)
+
 
 @dataclass(frozen=True)
 class MixedMemory:
@@ -127,6 +142,20 @@ class MixedMemory:
 
     def fading(self, duration: float) -> float:
         return 0.0
+
+    @property
+    def deformation(self) -> np.ndarray:
+        """Openings and then slidings (2m,), m."""
+        return np.append(self.opening, self.sliding)
+
+    def of(self, bonds: np.ndarray) -> MixedMemory:
+        """Some of the bonds, (k,) int."""
+        return MixedMemory(self.law.of(bonds), self.opening[bonds], self.sliding[bonds], self.state.of(bonds))
+
+    def among(self, law: MixedSoftening, bonds: np.ndarray, deformation: np.ndarray) -> MixedMemory:
+        """These bonds, (k,) int in a larger number with `law`; the others are undamaged."""
+        opening, sliding = np.split(deformation, 2)
+        return MixedMemory(law, opening, sliding, law.at_rest().changed(bonds, self.state))
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,13 @@ class MixedState:
         """The state of some of the bonds: numbers (k,) or bools (m,)."""
         return MixedState(self.progress[bonds], self.plastic[bonds], self.used[bonds])
 
+    def changed(self, bonds: np.ndarray, state: MixedState) -> MixedState:
+        """The state in which some bonds (k,) int are as another state of k has them."""
+        parts = [self.progress.copy(), self.plastic.copy(), self.used.copy()]
+        for mine, other in zip(parts, (state.progress, state.plastic, state.used), strict=True):
+            mine[bonds] = other
+        return MixedState(*parts)
+
 
 @dataclass(frozen=True)
 class Mode:

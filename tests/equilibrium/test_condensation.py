@@ -18,6 +18,7 @@ from pipeline.equilibrium.model import moved_at_once, whole_model
 from pipeline.equilibrium.solve import solve
 from pipeline.equilibrium.step import Stepper
 from pipeline.materials.memory import at_rest
+from pipeline.materials.mixed_softening import MixedSoftening
 
 from .specimens import fracture_test
 
@@ -129,3 +130,30 @@ def test_the_result_does_not_depend_on_condensation(beam: Problem, monkeypatch: 
         assert part.energy.error == pytest.approx(whole.energy.error, abs=2e-5)  # measured 1e-5 from the narrow strip
         assert np.array_equal(part.reached > beam.law.delta_peak, whole.reached > beam.law.delta_peak)
     assert len(growths) > 2
+
+
+def test_sliding_bonds_are_condensed_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the whole lattice: the elastic response to round-off, the test to the tolerance, islands included."""
+    problem = fracture_test(radius=1.5 * MM, scatter=0.5)
+    own = problem.law
+    law = MixedSoftening(
+        own.k_n, 0.3 * own.k_n, own.f_max, 0.7 * own.f_max, own.delta_max, 1.2 * own.delta_max, friction=0.4
+    )
+    problem = replace(problem, law=law, cmod_max=0.15 * MM, stations=np.array([0.06, 0.14]) * MM)
+    whole = whole_model(problem)
+    part = condense(whole, active.strip(problem))
+    exact, found = Stepper(whole).elastic(), Stepper(part).elastic()
+    assert found.load == pytest.approx(exact.load, rel=1e-10)  # round-off of two factorisations
+    assert part.complete(found.free, 1.0) == pytest.approx(exact.free, abs=1e-10)
+    growths, grown = [], CondensedModel.grown
+    monkeypatch.setattr(active, "FEWEST", 0)
+    monkeypatch.setattr(active.strip, "__defaults__", (0.08,))
+    monkeypatch.setattr(CondensedModel, "grown", lambda model, more: growths.append(1) or grown(model, more))
+    condensed, full = solve(problem, tolerance=2e-5), solve(problem, condensed=False, tolerance=2e-5)
+    assert growths
+    at = np.linspace(0.005, 0.145, 40) * MM
+    # twice the tolerance, 2e-5 of the strength, in the load of some tens of bonds, and YIELD
+    assert condensed.curve.load_at(at) == pytest.approx(full.curve.load_at(at), rel=2e-4)
+    assert condensed.displacement == pytest.approx(full.displacement, abs=2e-4 * np.abs(full.displacement).max())
+    assert condensed.energy.dissipated == pytest.approx(full.energy.dissipated, rel=1e-3)
+    assert condensed.energy.error < 1e-3  # trapezoids over the increments

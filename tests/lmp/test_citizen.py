@@ -12,7 +12,6 @@ import pytest
 
 from pipeline.lmp import plugin
 from pipeline.lmp.law_table import coefficients
-from pipeline.materials.cohesive import LinearSoftening
 from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.materials.relaxation import Arms
@@ -204,15 +203,31 @@ def test_the_virial_is_the_derivative_of_the_energy(law: str, style: str, newton
         assert slope == pytest.approx(-virial, abs=1e-6 * np.abs(virial).max())
 
 
-def test_beside_another_style() -> None:
-    expected = 30 * PEAK
+@pytest.mark.parametrize("law", [CENTRAL, coefficients(MIXED, 0)], ids=["central", "sliding"])
+def test_beside_another_style(law: str, tmp_path: Path) -> None:
+    """Alone or in `hybrid`, before and after a restart; there LAMMPS keeps the history, not the coefficients."""
     hybrid = {"bonds": "bond_style hybrid harmonic cohesive", "coeff": "bond_coeff 1 cohesive"}
-    with chain(CENTRAL, "", **hybrid, second="bond_coeff 2 harmonic 1.0 1.0") as lmp:
-        lmp.numpy.extract_atom("x")[1, 0] = LENGTH + expected
-        lmp.command("run 0 post no")
-        law = LinearSoftening(KN, FN, DN)
-        force = law.force(np.array([expected]), np.zeros(1))[0]
-        assert forces(lmp)[0] == pytest.approx([force, 0], abs=ROUND_OFF * FN)
+    other = "bond_coeff 2 harmonic 1.0 1.0"
+    pulled = []
+    for words in ({}, {**hybrid, "second": other, "style": ""}):
+        with chain(law, **words) as lmp:
+            for opening in (30, 12):
+                lmp.numpy.extract_atom("x")[1, :2] = [LENGTH + opening * PEAK, 5 * PEAK]
+                lmp.command("run 0 post no")
+            pulled.append(forces(lmp))
+            lmp.command(f"write_restart {tmp_path / 'hybrid'}")
+    again = plugin.open_lammps()
+    try:
+        again.commands_string(
+            f"atom_modify map array\nread_restart {tmp_path / 'hybrid'}\npair_style none\nneighbor 6e-4 bin\n"
+            f"comm_modify cutoff 0.005\nbond_coeff 1 cohesive {law}\n{other}\nrun 0 post no"
+        )
+        pulled.append(forces(again))
+    finally:
+        again.close()
+    assert 0.1 * FN < pulled[0][0, 0] < FN
+    assert pulled[1] == pytest.approx(pulled[0], rel=1e-14)  # the same operations
+    assert pulled[2] == pytest.approx(pulled[0], rel=1e-14)  # on the same numbers
 
 
 def test_rerun_remembers_from_frame_to_frame(tmp_path: Path) -> None:
