@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ from pipeline.study.blind_check.seal import (
 
 DIAGNOSE = "pipeline.study.diagnose:diagnose"
 DIAGNOSES, SIMULATIONS, SCRATCH = "diagnoses", "simulations", "scratch"
+LOG, SECONDS = "log.txt", "seconds.json"
 
 
 def run(
@@ -108,12 +109,22 @@ def _diagnosed(
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     settings = {"TMPDIR": scratch, "MPLCONFIGDIR": scratch, "HOME": scratch, "PYTHONPATH": paths, "MPLBACKEND": "Agg"}
     settings["PYTHONDONTWRITEBYTECODE"] = "1"
-    ended = subprocess.run(command, cwd=out, env=os.environ | settings, capture_output=True, text=True, check=False)
-    write_atomically(folder / "log.txt", (ended.stdout + ended.stderr).encode())
-    if ended.returncode == 0 and (folder / RESULT).exists():
+    code = _timed(command, out, os.environ | settings, folder)
+    if code == 0 and (folder / RESULT).exists():
         return None
-    told = ended.stderr.strip().splitlines()
-    return told[-1] if told else f"the process ended with {ended.returncode} and no result"
+    return _last_line(folder / LOG) or f"the process ended with {code} and no result"
+
+
+def _timed(command: Sequence[str], out: Path, settings: Mapping[str, str], folder: Path) -> int:
+    """Run a process, its words into the log and its seconds into a file; returns its code."""
+    began = time.monotonic()
+    with (folder / LOG).open("wb") as log:
+        process = subprocess.Popen(command, cwd=out, env=settings, stdout=log, stderr=subprocess.STDOUT)
+        _, status, used = os.wait4(process.pid, 0)  # with what its own children used
+    process.returncode = code = os.waitstatus_to_exitcode(status)
+    taken = {"seconds": time.monotonic() - began, "processor_seconds": used.ru_utime + used.ru_stime}
+    write_atomically(folder / SECONDS, canonical(taken))
+    return code
 
 
 def _sealed(out: Path, names: Sequence[str]) -> str:
@@ -121,7 +132,10 @@ def _sealed(out: Path, names: Sequence[str]) -> str:
     found = {name: _found(out, name) for name in names}
     missing = [name for name, result in found.items() if result is None]
     failed = {name: _why(out, name) for name in missing}
-    content = canonical({"verdicts": {n: r for n, r in found.items() if r is not None}, "failed": failed})
+    taken = {name: row for name in names if (row := _taken(out, name))}
+    content = canonical(
+        {"verdicts": {n: r for n, r in found.items() if r is not None}, "failed": failed, "seconds": taken}
+    )
     write_atomically(out / VERDICTS, content)
     seal = {
         "verdicts_sha256": digest(content),
@@ -136,6 +150,14 @@ def _sealed(out: Path, names: Sequence[str]) -> str:
 
 
 def _why(out: Path, name: str) -> str:
-    log = out / DIAGNOSES / name / "log.txt"
+    return _last_line(out / DIAGNOSES / name / LOG) or "it was not run"
+
+
+def _last_line(log: Path) -> str:
     lines = log.read_text("utf-8", errors="replace").strip().splitlines() if log.exists() else []
-    return lines[-1] if lines else "it was not run"
+    return lines[-1] if lines else ""
+
+
+def _taken(out: Path, name: str) -> dict[str, Any] | None:
+    path = out / DIAGNOSES / name / SECONDS
+    return read_json(path) if path.exists() else None
