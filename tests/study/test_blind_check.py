@@ -78,6 +78,9 @@ def test_a_right_diagnosis_is_scored_right(sealed):
     assert result["top1"]["value"] == 1.0
     assert result["seals_ok"] is True
     assert result["misses"] == []
+    assert sorted(result["run_times"]["cases"]) == ["case-0", "case-1", "case-2"]
+    assert 0 < result["run_times"]["total"]["processor_seconds"] < 600  # three interpreters, not none and not hours
+    assert (sealed / "reliability.png").read_bytes().startswith(b"\x89PNG")
     assert "seals hold; 3 cases, 0 failed" in told
     assert "<h1" in (sealed / "report.html").read_text()
     assert "case-1 modulus creep" in (sealed / "calls.txt").read_text()
@@ -216,6 +219,10 @@ def test_against_shuffled_truth_a_right_diagnosis_is_at_chance():
     low, high = wrong["top1"]["interval_95"]
     assert low <= 1 / len(EFFECTS) <= high
     assert wrong["top1"]["value"] < 0.12  # chance is 0.05; four standard deviations of 200 cases
+    chance = right["baselines"]["shuffled_truth"]["top1"]
+    assert chance["value"] == pytest.approx(1 / len(EFFECTS), abs=0.005)  # mean of 1000 orders: ± 0.015/√1000
+    assert chance["interval_95"][0] <= wrong["top1"]["value"] <= chance["interval_95"][1]
+    assert right["top1"]["value"] > 5 * chance["interval_95"][1]
 
 
 def test_the_cases_of_a_full_check():

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pipeline import __version__
 from pipeline.core.errors import InputError, MissingFileError, StoreError
-from pipeline.report.page import Number, Section, page
+from pipeline.report.page import Figure, Number, Section, page
+from pipeline.report.reliability import reliability
 from pipeline.store.atomic import write_atomically
 from pipeline.store.results import write_result
-from pipeline.study.blind_check.score import scores
+from pipeline.study.blind_check.score import scores, times
 from pipeline.study.blind_check.seal import (
     LOCKED,
     OPENED,
@@ -26,7 +27,7 @@ from pipeline.study.blind_check.seal import (
     unlock,
     vault_of,
 )
-from pipeline.study.pages import write_page
+from pipeline.study.pages import picture, write_page
 
 ROW = ("specimen", "kind", "effects")  # what every row of a truth table must say
 GOALS = (
@@ -87,9 +88,10 @@ def open_check(out: Path, *, truth: Path | None = None) -> str:
         "salt": table["salt"],
         "seed": table.get("seed"),
         **scores(table["cases"], verdicts["verdicts"]),
+        "run_times": times(verdicts.get("seconds", {})),
     }
     write_result(out, result)
-    write_page(out, report(result, table["cases"], verdicts["failed"]))
+    write_page(out, report(result, table["cases"], verdicts["failed"], figures(out, result)))
     return sentence(result)
 
 
@@ -134,7 +136,26 @@ def _between(score: Mapping[str, Any]) -> str:
     return "" if between is None or score["value"] is None else f"{between[0]:.2f} to {between[1]:.2f}"
 
 
-def report(result: Mapping[str, Any], truth: Mapping[str, Any], failed: Mapping[str, str]) -> str:
+def figures(out: Path, result: Mapping[str, Any]) -> list[Figure]:
+    """What the page shows of the stated probabilities."""
+    if not result["reliability"]:
+        return []
+    caption = "Probability of what was named against how often it was right; bars: 95 % after Wilson, figures: cases."
+    return [picture(out, "reliability", lambda axes: reliability(axes, result["reliability"]), caption)]
+
+
+def _took(taken: Mapping[str, Any]) -> list[Number]:
+    """Rows of the run times: in total, and the longest."""
+    rows = sorted(taken["cases"].items(), key=lambda item: -item[1]["processor_seconds"])
+    told = [("all diagnoses", taken["total"]), *rows[:3]] if rows else []
+    return [
+        Number(n, f"{r['processor_seconds']:.0f} s", f"of processors; {r['seconds']:.0f} s passed") for n, r in told
+    ]
+
+
+def report(
+    result: Mapping[str, Any], truth: Mapping[str, Any], failed: Mapping[str, str], pictures: Sequence[Figure] = ()
+) -> str:
     """The page: misses, scores beside goals and baselines, confusion, reliability."""
     misses = [
         Number(f"{m['case']}: {m['truth']}", f"{m['said']} ({m['probability']:.2f})", f"{m['verdict']}; {m['effects']}")
@@ -166,8 +187,9 @@ def report(result: Mapping[str, Any], truth: Mapping[str, Any], failed: Mapping[
         Section("Scores", text="95 % intervals after Wilson, for cases clustered by specimen.", numbers=rows),
         Section("Simpler ways to choose: exact top-1", numbers=simple),
         Section("Confusion: truth and what was most probable", numbers=confused),
-        Section("Reliability of the stated probability", numbers=bins),
+        Section("Reliability of the stated probability", numbers=bins, figures=list(pictures)),
         Section("Named right by size of the effect", numbers=by_multiple),
+        Section("Time taken", numbers=_took(result["run_times"])),
         Section("Diagnoses that failed", notes=[f"{name}: {why}" for name, why in sorted(failed.items())]),
     ]
     judge = result["judged_by"]

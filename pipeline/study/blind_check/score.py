@@ -141,15 +141,20 @@ def _sure(case: Scored) -> float:
     return float(sum(p for n, p in chances.items() if set(n.split(" + ")) <= named))
 
 
-def calibration(cases: Sequence[Scored]) -> tuple[float | None, list[dict[str, float]]]:
+def calibration(cases: Sequence[Scored]) -> tuple[float | None, list[dict[str, Any]]]:
     """Expected calibration error of the top label, and the reliability diagram's bins."""
     if not cases:
         return None, []
     p = np.array([c.probability for c in cases])
     right = np.array([float(c.right) for c in cases])
     place = np.minimum((p * BINS).astype(int), BINS - 1)
-    rows = [
-        {"stated": float(p[m].mean()), "achieved": float(right[m].mean()), "cases": float(m.sum())}
+    rows: list[dict[str, Any]] = [
+        {
+            "stated": float(p[m].mean()),
+            "achieved": float(right[m].mean()),
+            "cases": float(m.sum()),
+            "interval_95": list(wilson(float(right[m].sum()), float(m.sum()))),
+        }
         for m in (place == k for k in range(BINS))
         if m.any()
     ]
@@ -195,8 +200,26 @@ def baselines(cases: Sequence[Scored]) -> dict[str, Any]:
     return {
         "noise_bic": {"top1": share(with_bic, lambda c: by_noise(c) == c.truth)},
         "largest_rms_drop": {"top1": share([c for c in cases if c.result], lambda c: largest_drop(c) == c.truth)},
+        "shuffled_truth": {"top1": shuffled(cases)},
         "random": {"top1": {"value": 1 / (len(library()) + 1), "interval_95": None, "cases": len(cases)}},
     }
+
+
+def shuffled(cases: Sequence[Scored], seed: int = 0) -> dict[str, Any]:
+    """Top-1 of these verdicts against the truths in random order, and where 95 % of a thousand orders lie."""
+    if not cases:
+        return {"value": None, "interval_95": [0.0, 1.0], "cases": 0}
+    rng = np.random.default_rng(seed)
+    truth, top = np.array([c.truth for c in cases]), np.array([c.top for c in cases])
+    hits = [float(np.mean(rng.permutation(truth) == top)) for _ in range(1000)]
+    low, high = np.percentile(hits, [2.5, 97.5]).tolist()
+    return {"value": float(np.mean(hits)), "interval_95": [low, high], "cases": len(cases)}
+
+
+def times(taken: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """Seconds of every diagnosis, on the clock and of processors, and in total."""
+    total = {key: float(sum(row[key] for row in taken.values())) for key in ("seconds", "processor_seconds")}
+    return {"total": total, "cases": {name: dict(row) for name, row in sorted(taken.items())}}
 
 
 def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, Any]:
