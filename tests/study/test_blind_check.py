@@ -17,7 +17,7 @@ from pipeline.study.blind_check import cases as drawing
 from pipeline.study.blind_check import make as making
 from pipeline.study.blind_check.guard import Guard
 from pipeline.study.blind_check.opening import open_check
-from pipeline.study.blind_check.run import run
+from pipeline.study.blind_check.run import replicates, run
 from pipeline.study.blind_check.score import calibration, design_effect, paired, scores, wilson
 from pipeline.study.blind_check.seal import SEAL, VERDICTS, lock, salted, unlock, vault_of, write_seal
 
@@ -107,6 +107,39 @@ def test_a_bundle_changed_before_the_run_is_not_diagnosed(sealed):
     flip(sealed / "bundles" / "case-0" / "hint.json")
     with pytest.raises(StoreError, match="not those that were sealed"):
         run(sealed, diagnose=FAKE)
+
+
+def test_replicates_are_diagnosed_together_and_leave_their_own_verdicts(sealed):
+    plan = {"case-0": {"replicates": "set-0"}, "case-2": {"replicates": "set-0"}, "case-1": {"without": ["creep"]}}
+    (sealed / "plan.json").write_text(json.dumps(plan))
+    rows = {"case-0": row("modulus", replicates="set-0"), "case-1": row("creep"),
+            "case-2": row("modulus", "b", replicates="set-0")}  # fmt: skip
+    truth = sealed.parent / "truth.json"
+    truth.write_bytes(salted({"cases": rows}))
+    hint(sealed, "case-2", says="modulus")
+    assert "4 verdicts sealed" in run(sealed, diagnose=FAKE, workers=2)
+    calls = [line.split()[0] for line in (sealed / "calls.txt").read_text().splitlines()]
+    assert sorted(calls) == ["case-0+case-2", "case-1"]  # none of the set is diagnosed again by itself
+    open_check(sealed, truth=truth)
+    result = json.loads((sealed / "result.json").read_text())
+    assert result["top1"]["value"] == 1.0
+    assert result["together"]["sets"] == 1
+    assert result["together"]["class_top1"]["value"] == 1.0
+    assert "set-0" in result["run_times"]["cases"]
+
+
+def test_members_of_a_set_that_fails_are_diagnosed_by_themselves(sealed):
+    plan = {"case-0": {"replicates": "set-0"}, "case-2": {"replicates": "set-0"}}
+    (sealed / "plan.json").write_text(json.dumps(plan))
+    hint(sealed, "case-0", wait_for="never")
+    assert "2 verdicts sealed; 2 failed: case-0, set-0" in run(sealed, diagnose=FAKE)
+
+
+def test_sets_with_two_libraries_are_refused():
+    with pytest.raises(StoreError, match="different libraries"):
+        replicates({"a": {"replicates": "s", "without": ["creep"]}, "b": {"replicates": "s"}}, ["a", "b"])
+    with pytest.raises(StoreError, match="a bundle's name"):
+        replicates({"a": {"replicates": "b"}, "b": {"replicates": "b"}}, ["a", "b"])
 
 
 @pytest.mark.parametrize("file", ["truth.fernet", "key"])
@@ -232,7 +265,9 @@ def test_the_cases_of_a_full_check():
     for name in EFFECTS:
         size = library()[name].magnitude
         mine = [c for c in found if c.kind == "effect" and list(c.effects) == [name]]
-        assert len(mine) == 8  # four multiples at two noise levels
+        assert len(mine) == 7 + 4  # four multiples at two noise levels, one of these on four specimens
+        kinds = {(round(c.multiple, 6), c.noise) for c in mine}
+        assert len(kinds) == 8 or min(4 * limits[name], size.high) < 4 * limits[name]  # fewer where the cap is met
         assert all(size.low <= c.effects[name] <= size.high for c in mine)
         assert sum(c.kind == "outside" and name in c.effects and name in c.without for c in found) == 1
     assert all(not set(c.effects) & set(c.without) for c in found if c.kind != "outside")

@@ -17,6 +17,7 @@ MULTIPLES = (0.5, 1.0, 2.0, 4.0)
 LIMIT = 0.5  # of the scale of an effect's prior: its detection limit where none is given
 NOISE = {"low": (0.005, 5.0), "high": (0.02, 15.0)}  # of displacement (px of 0.0439 mm) and load (N)
 ONLY_BEAMS = ("eccentricity_mm",)
+REPLICATES = 4  # specimens of a set that is diagnosed together
 STRANGERS = {"aggregate_modulus": -0.5, "gauge_length": 0.5}  # no library has them; relative change
 DECOYS = 2  # effects that are left out although they are not there, wherever something is left out
 
@@ -37,6 +38,7 @@ class Case:
     noise : key of `NOISE`
     images : bool; speckle images instead of fields
     without : effects that the library of this diagnosis must do without
+    replicates : name of the set that is also diagnosed together; "" where alone
     """
 
     name: str
@@ -49,6 +51,7 @@ class Case:
     images: bool = False
     without: tuple[str, ...] = ()
     stranger: tuple[str, float] | None = None
+    replicates: str = ""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class Size:
 
 SIZES = {
     "small": Size(1.5, 2.0, ("seb", "seb"), 25, 0.09),
-    "full": Size(0.6, 1.0, ("seb", "seb", "seb", "seb", "dct", "dct"), 61, 0.0439),
+    "full": Size(1.0, 1.5, ("seb",) * 6, 61, 0.0439),  # geometry and radius of the library of discrepancies that ships
 }
 # small: what each of the twelve cases is, in the order of the library's kinds
 SMALL = (
@@ -134,6 +137,17 @@ def drawn_cases(size: str, limits: Mapping[str, float], rng: np.random.Generator
     return cases
 
 
+def _replicates(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Sets of specimens with the same effect at the largest multiple, and one without any; low noise."""
+    new: list[dict[str, Any]] = []
+    sets = [(), *((name,) for name in library())]
+    labels = [f"set-{k:02d}" for k in rng.permutation(len(sets)).tolist()]
+    for label, names in zip(labels, sets, strict=True):
+        row = _row(tuple((n, max(MULTIPLES)) for n in names), limits, rng) | {"noise": "low", "replicates": label}
+        new += [row | {"specimen": k} for k in range(REPLICATES)]
+    return new
+
+
 def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
     sizes = {n: sized(n, m, limits, rng.choice([-1.0, 1.0])) for n, m in names}
     kind = ("none", "effect", "pair")[len(names)]
@@ -160,7 +174,7 @@ def _full(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[st
     geometries = SIZES["full"].specimens
     for name in library():
         for multiple in MULTIPLES:
-            for noise in NOISE:
+            for noise in NOISE if multiple < max(MULTIPLES) else ("high",):  # at low noise: the replicates
                 allowed = [k for k, g in enumerate(geometries) if g == "seb" or name not in ONLY_BEAMS]
                 row = _row(((name, multiple),), limits, rng) | {"noise": noise, "specimen": int(rng.choice(allowed))}
                 rows.append(_left_out(row, False, rng) if rng.uniform() < 0.2 else row)
@@ -169,9 +183,12 @@ def _full(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[st
     for specimen in range(len(geometries)):
         for noise in NOISE:
             row = _row((), limits, rng) | {"noise": noise, "specimen": specimen}
-            rows += [row, _left_out(dict(row), False, rng)]
+            rows.append(_left_out(dict(row), False, rng))
+            if noise != "low" or specimen >= REPLICATES:
+                rows.append(row)
         for name, value in STRANGERS.items():
             rows.append(_row((), limits, rng) | {"kind": "outside", "stranger": (name, value), "specimen": specimen})
+    rows += _replicates(limits, rng)
     names = [n for n in library() if n not in ONLY_BEAMS]
     for _ in range(2 * len(geometries)):
         pair = tuple((str(n), 4.0) for n in rng.choice(names, 2, replace=False))

@@ -1,6 +1,6 @@
 """The process in which a sealed bundle is diagnosed: it opens no path outside OUT but those of its own program.
 
-Started as `python -m pipeline.study.blind_check.guard OUT BUNDLE RESULTS SEED WITHOUT MODULE:FUNCTION`.
+Started as `python -m pipeline.study.blind_check.guard OUT BUNDLES RESULTS SEED WITHOUT MODULE:FUNCTION`.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ def _below(path: str, folder: str) -> bool:
 
 
 def main(arguments: list[str]) -> None:
-    """Diagnose one bundle under guard."""
-    out, bundle, results, seed, without, target = arguments
+    """Diagnose a bundle, or several together, under guard."""
+    out, bundles, results, seed, without, target = arguments
     module, function = target.split(":")
     sys.addaudithook(Guard(Path(out).resolve()))
     diagnose = getattr(importlib.import_module(module), function)
     names = tuple(n for n in without.split(",") if n)
-    diagnose([Path(bundle)], Path(results), without=names, seed=int(seed), workers=1)
+    diagnose([Path(b) for b in bundles.split(os.pathsep)], Path(results), without=names, seed=int(seed), workers=1)
 
 
 if __name__ == "__main__":

@@ -118,7 +118,10 @@ def make(
         write_case(out / BUNDLES / case.name, case, drawn[case.specimen], broken[_same(case)], chosen, streams[k])
         progress.done(case.name)
     truth = salted({"format": 1, "size": size, "seed": seed, "version": __version__, "cases": rows})
-    (out / PLAN).write_bytes(canonical({c.name: {"without": list(c.without)} for c in cases}))
+    plan = {
+        c.name: {"without": list(c.without)} | ({"replicates": c.replicates} if c.replicates else {}) for c in cases
+    }
+    (out / PLAN).write_bytes(canonical(plan))
     lock(truth, vault)
     made = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     write_seal(out, truth, vault, {"size": size, "made": made})
@@ -265,6 +268,11 @@ def measuring_points(specimen: Specimen) -> np.ndarray:
     return points[specimen.contains(points)]
 
 
+def planned(case: Case) -> dict[str, Any]:
+    """What `run` must know of a case."""
+    return {"without": list(case.without)} | ({"replicates": case.replicates} if case.replicates else {})
+
+
 def truth_row(case: Case, drawn: Drawn, limits: dict[str, float]) -> dict[str, Any]:
     """What the truth table says of a case."""
     return {
@@ -274,6 +282,7 @@ def truth_row(case: Case, drawn: Drawn, limits: dict[str, float]) -> dict[str, A
         "effects": dict(case.effects),
         "stranger": None if case.stranger is None else {case.stranger[0]: case.stranger[1]},
         "without": list(case.without),
+        "replicates": case.replicates,
         "multiple": case.multiple,
         "detection_limit": {n: limits[n] for n in case.effects},
         "noise": case.noise,

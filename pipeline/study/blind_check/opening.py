@@ -13,7 +13,7 @@ from pipeline.report.page import Figure, Number, Section, page
 from pipeline.report.reliability import reliability
 from pipeline.store.atomic import write_atomically
 from pipeline.store.results import write_result
-from pipeline.study.blind_check.score import scores, times
+from pipeline.study.blind_check.score import scores, scores_together, times
 from pipeline.study.blind_check.seal import (
     LOCKED,
     OPENED,
@@ -88,6 +88,7 @@ def open_check(out: Path, *, truth: Path | None = None) -> str:
         "salt": table["salt"],
         "seed": table.get("seed"),
         **scores(table["cases"], verdicts["verdicts"]),
+        "together": scores_together(table["cases"], verdicts.get("together", {})),
         "run_times": times(verdicts.get("seconds", {})),
     }
     write_result(out, result)
@@ -171,6 +172,11 @@ def report(
         Number(name.replace("_", " "), _shown(row["top1"]), f"{_between(row['top1'])}; {row['top1']['cases']} cases")
         for name, row in result["baselines"].items()
     ]
+    pooled = [
+        Number(told, _shown(result["together"][key]), f"{_between(result['together'][key])}; goal {goal}")
+        for key, told, goal in (("class_top1", "by class", "0.80"), ("top1", "exact", "none"),
+                                ("false_alarm", "false alarms", "at most 0.05"))
+    ]  # fmt: skip
     confused = [
         Number(t, ", ".join(f"{said} {count}" for said, count in row.items())) for t, row in result["confusion"].items()
     ]
@@ -185,6 +191,7 @@ def report(
     sections = [
         Section("Misses", text=f"{len(misses)} of {result['cases']} cases were not named right.", numbers=misses),
         Section("Scores", text="95 % intervals after Wilson, for cases clustered by specimen.", numbers=rows),
+        Section("Replicates together", text=f"{result['together']['sets']} sets.", numbers=pooled),
         Section("Simpler ways to choose: exact top-1", numbers=simple),
         Section("Confusion: truth and what was most probable", numbers=confused),
         Section("Reliability of the stated probability", numbers=bins, figures=list(pictures)),

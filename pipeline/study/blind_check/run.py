@@ -69,21 +69,44 @@ def run(
         raise StoreError(f"the bundles of {out} are not those that were sealed: make the check again")
     plan = read_json(out / PLAN) if (out / PLAN).exists() else {}
     names = sorted(path.name for path in (out / BUNDLES).iterdir() if path.is_dir())
-    done = [name for name in names if _found(out, name) is not None]
-    progress.stage(f"diagnosing {len(names)} sealed bundles")
-    progress.begin(len(names), len(done), "diagnosis")
+    sets = replicates(plan, names)
+    tasks = [*sets.items(), *((name, [name]) for name in names)]
+    done = [name for name, _ in tasks if _found(out, name) is not None]
+    progress.stage(f"diagnosing {len(names)} sealed bundles" + (f", {len(sets)} sets of replicates" if sets else ""))
+    progress.begin(len(tasks), len(done), "diagnosis")
 
-    def judge(name: str) -> str | None:
-        return _diagnosed(out, name, plan.get(name, {}).get("without", ()), diagnose, seed, prefix)
+    def judge(task: tuple[str, list[str]]) -> str | None:
+        return _diagnosed(out, *task, plan.get(task[1][0], {}).get("without", ()), diagnose, seed, prefix)
 
-    wanted = [name for name in names if name not in done]
-    with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
-        for name, failure in zip(wanted, pool.map(judge, wanted), strict=True):
-            if failure is None:
-                progress.done(name)
-            else:
-                progress.failed(name, PipelineError(failure))
-    return _sealed(out, names)
+    for chosen in (sets, {name: [name] for name in names}):  # sets first: they leave the verdicts of their members
+        wanted = [(name, members) for name, members in chosen.items() if _found(out, name) is None]
+        with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
+            for (name, _), failure in zip(wanted, pool.map(judge, wanted), strict=True):
+                if failure is None:
+                    progress.done(name)
+                else:
+                    progress.failed(name, PipelineError(failure))
+    return _sealed(out, names, list(sets))
+
+
+def replicates(plan: Mapping[str, Any], names: Sequence[str]) -> dict[str, list[str]]:
+    """Sets of bundles that are diagnosed together, as the plan says.
+
+    Raises
+    ------
+    StoreError
+        where a set has the name of a bundle, or bundles of one set are to be judged by different libraries
+    """
+    found: dict[str, list[str]] = {}
+    for name in names:
+        label = plan.get(name, {}).get("replicates")
+        if label:
+            found.setdefault(str(label), []).append(name)
+    for label, members in found.items():
+        libraries = {tuple(plan[name].get("without", ())) for name in members}
+        if label in names or len(libraries) > 1:
+            raise StoreError(f"the plan's set {label!r} has a bundle's name, or members with different libraries")
+    return {label: members for label, members in sorted(found.items()) if len(members) > 1}
 
 
 def _found(out: Path, name: str) -> dict[str, Any] | None:
@@ -91,19 +114,35 @@ def _found(out: Path, name: str) -> dict[str, Any] | None:
     return read_json(path) if path.exists() else None
 
 
-def _diagnosed(
-    out: Path, name: str, without: Sequence[str], diagnose: str, seed: int, prefix: Sequence[str]
-) -> str | None:
-    """Run one diagnosis; why it failed, or None."""
+def _folder(out: Path, name: str) -> Path:
+    """Of one diagnosis; tests of one specimen at the same stations share their simulations."""
     folder = prepare_output(out / DIAGNOSES / name)
     shared = folder / SIMULATIONS
-    if not shared.exists():  # tests of one specimen at the same stations share their simulations
+    if not shared.exists():
         prepare_output(out / SIMULATIONS)
         shared.symlink_to(out / SIMULATIONS, target_is_directory=True)
+    return folder
+
+
+def _diagnosed(
+    out: Path,
+    name: str,
+    members: Sequence[str],
+    without: Sequence[str],
+    diagnose: str,
+    seed: int,
+    prefix: Sequence[str],
+) -> str | None:
+    """Run one diagnosis of one bundle or of several; why it failed, or None."""
+    folder = _folder(out, name)
+    for member in members if len(members) > 1 else ():
+        if not (folder / member).exists():
+            (folder / member).symlink_to(_folder(out, member), target_is_directory=True)
     scratch = str(prepare_output(out / SCRATCH))
+    bundles = os.pathsep.join(str(out / BUNDLES / member) for member in members)
     command = [
-        *prefix, sys.executable, "-m", "pipeline.study.blind_check.guard", str(out), str(out / BUNDLES / name),
-        str(folder), str(seed), ",".join(without), diagnose,
+        *prefix, sys.executable, "-m", "pipeline.study.blind_check.guard", str(out), bundles, str(folder), str(seed),
+        ",".join(without), diagnose,
     ]  # fmt: skip
     root = str(Path(__file__).resolve().parents[3])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -127,15 +166,19 @@ def _timed(command: Sequence[str], out: Path, settings: Mapping[str, str], folde
     return code
 
 
-def _sealed(out: Path, names: Sequence[str]) -> str:
+def _sealed(out: Path, names: Sequence[str], sets: Sequence[str]) -> str:
     """Write all verdicts into one file, and its digest with the code's beside it."""
     found = {name: _found(out, name) for name in names}
     missing = [name for name, result in found.items() if result is None]
-    failed = {name: _why(out, name) for name in missing}
-    taken = {name: row for name in names if (row := _taken(out, name))}
-    content = canonical(
-        {"verdicts": {n: r for n, r in found.items() if r is not None}, "failed": failed, "seconds": taken}
-    )
+    together = {name: _found(out, name) for name in sets}
+    missing += [name for name, result in together.items() if result is None]
+    table: dict[str, dict[str, Any]] = {
+        "verdicts": {n: r for n, r in found.items() if r is not None},
+        "together": {n: r for n, r in together.items() if r is not None},
+        "failed": {name: _why(out, name) for name in missing},
+        "seconds": {name: row for name in (*names, *sets) if (row := _taken(out, name))},
+    }
+    content = canonical(table)
     write_atomically(out / VERDICTS, content)
     seal = {
         "verdicts_sha256": digest(content),
@@ -146,7 +189,7 @@ def _sealed(out: Path, names: Sequence[str]) -> str:
     }
     write_atomically(out / VERDICT_SEAL, canonical(plain(seal)))
     told = f"; {len(missing)} failed: {', '.join(missing)} (logs in {DIAGNOSES})" if missing else ""
-    return f"{len(names) - len(missing)} verdicts sealed{told}"
+    return f"{len(table['verdicts']) + len(table['together'])} verdicts sealed{told}"
 
 
 def _why(out: Path, name: str) -> str:

@@ -79,6 +79,29 @@ def paired(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> list[Scored
     return [_one(name, row, verdicts.get(name)) for name, row in sorted(truth.items())]
 
 
+def together(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> list[Scored]:
+    """Every set of replicates with the verdict of its members together, each a specimen of its own."""
+    sets: dict[str, Mapping[str, Any]] = {}
+    for _, row in sorted(truth.items()):
+        if row.get("replicates"):
+            sets.setdefault(str(row["replicates"]), row)
+    return [_one(name, {**row, "specimen": name}, verdicts.get(name)) for name, row in sorted(sets.items())]
+
+
+def scores_together(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, Any]:
+    """Scores of sets of replicates, by the same keys as those of single tests."""
+    every = together(truth, verdicts)
+    single, free = ([c for c in every if c.kind == kind] for kind in ("effect", "none"))
+    return {
+        "sets": len(every),
+        "failed": sum(not c.result for c in every),
+        "top1": share(single, lambda c: c.right),
+        "class_top1": share(single, lambda c: c.right_class),
+        "false_alarm": share(free, named_surely),
+        "misses": [_miss(c) for c in every if not c.right],
+    }
+
+
 def _one(name: str, row: Mapping[str, Any], result: Mapping[str, Any] | None) -> Scored:
     known = "outside" if row["kind"] == "outside" else label_of(list(row["effects"]))
     common = {"name": name, "specimen": row["specimen"], "kind": row["kind"], "truth": known, "row": row}
