@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -201,6 +202,16 @@ def test_the_virial_is_the_derivative_of_the_energy(law: str, style: str, newton
         assert damage.max() > 0.1
         # energies are quadratic in the strain, but for arcs; what limits is the round-off of a difference of energies
         assert slope == pytest.approx(-virial, abs=1e-6 * np.abs(virial).max())
+
+
+def test_what_bonds_remember_cannot_change_its_meaning() -> None:
+    """Stiffness may change between runs; unloading may not where bonds slide, for D would be read as a way."""
+    with chain(coefficients(MIXED, 0)) as lmp:
+        lmp.command(f"bond_coeff 1 {coefficients(replace(MIXED, k_n=2 * MIXED.k_n), 0)}")
+        with pytest.raises(Exception, match="unloading of bond type 1 cannot change between secant and elastic once"):
+            lmp.command(f"bond_coeff 1 {coefficients(replace(MIXED, unloading='elastic'), 0)}")
+    with chain(CENTRAL) as lmp:  # opening alone keeps delta_reached either way
+        lmp.command(f"bond_coeff 1 {CENTRAL} unloading elastic")
 
 
 @pytest.mark.parametrize("law", [CENTRAL, coefficients(MIXED, 0)], ids=["central", "sliding"])

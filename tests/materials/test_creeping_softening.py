@@ -146,6 +146,7 @@ def test_a_bond_that_crept_under_compression_softens_from_its_own_origin(unloadi
     onset = float(law.onset(state, 0.0)[0])
     assert onset < 0
     below, above = (float(law.force(state, np.array([onset * (1 + s)]), 0.0)[0]) for s in (1e-9, -1e-9))
+    # K(0) × 1e-9 δ* is 1e-8 of F, the slope of the branch less
     assert below == pytest.approx(F, rel=1e-6)
     assert above == pytest.approx(F, rel=1e-6)
     state = law.advance(state, np.array([onset + 1e-9]), 0.0)
@@ -230,8 +231,8 @@ def test_without_time_it_is_the_law_without_creep(shape, unloading):
         after = law.advance(state, opening, 0.0)
         used = used + law.used(state, after, 0.0)
         state, reached = after, plain.reached(opening, reached)
-        assert law.stored(state) == pytest.approx(plain.stored(opening, reached), abs=1e-11 * F * D)
-        assert used == pytest.approx(plain.dissipated(reached), abs=1e-10 * F * D)
+        assert law.stored(state) == pytest.approx(plain.stored(opening, reached), abs=1e-11 * F * D)  # as above
+        assert used == pytest.approx(plain.dissipated(reached), abs=1e-10 * F * D)  # asked for
         expected = np.minimum(reached, plain.delta_end) * (reached > plain.delta_peak)
         assert law.equivalent(state) == pytest.approx(expected, rel=1e-11)  # as above
     assert law.broken(state).all()

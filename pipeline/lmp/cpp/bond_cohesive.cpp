@@ -95,7 +95,14 @@ void BondCohesive::coeff(int narg, char **arg)
   cohesive::Law own;
   const std::string wrong = cohesive::read_law(std::vector<std::string>(arg + 1, arg + narg), own);
   if (!wrong.empty()) error->all(FLERR, wrong);
-  for (int type = low; type <= high; type++) set_law(type, own);
+  for (int type = low; type <= high; type++) {
+    const auto &before = law[type];
+    const bool remembers = setflag[type] && (history_index >= 0 || restored) && before.slides() && own.slides();
+    if (remembers && before.elastic_unloading != own.elastic_unloading)
+      error->all(FLERR, "unloading of bond type {} cannot change between secant and elastic once its bonds remember: a "
+                 "bond that slides keeps its damage with the one, its way along the branch with the other", type);
+    set_law(type, own);
+  }
 }
 
 bool BondCohesive::creeps() const
