@@ -18,8 +18,8 @@ from numpy.ctypeslib import ndpointer
 from scipy import sparse
 from scipy.linalg import cython_blas
 
-VERSION = 1  # CHOLESKY_INTERFACE
-SMALLEST = {4: 1e-6, 8: 1e-14}  # by bytes a number: pivots are raised to this share of the diagonal entry
+VERSION = 2  # CHOLESKY_INTERFACE
+SMALLEST = {4: 1e-6, 8: 1e-12}  # by bytes a number: pivots are raised to this share of the diagonal entry
 
 _DOUBLES, _INTS = (ndpointer(kind, flags="C_CONTIGUOUS") for kind in ("f8", "i4"))
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -28,6 +28,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "cholesky_new_factor": (c_void_p, (c_void_p, _DOUBLES, c_double, c_int32)),
     "cholesky_free_factor": (None, (c_void_p,)),
     "cholesky_raised": (c_int64, (c_void_p,)),
+    "cholesky_last": (None, (c_void_p, c_int64, _DOUBLES)),
     "cholesky_solve": (c_int32, (c_void_p, _DOUBLES, c_int64)),
 }
 _BLAS = ("sgemm", "ssyrk", "strsm", "dgemm", "dsyrk", "dtrsm")
@@ -78,6 +79,14 @@ class Factor:
         weakref.finalize(self, plan.library.cholesky_free_factor, self.address)
         self.raised = int(plan.library.cholesky_raised(self.address))
 
+    def last(self, count: int) -> np.ndarray:
+        """The last block (count, count) of the lower triangle L, K = L Lᵀ."""
+        if not 0 <= count <= self.plan.size:
+            raise ValueError(f"the factor has {self.plan.size} rows, {count} are asked for")
+        block = np.empty((count, count))
+        self.plan.library.cholesky_last(self.address, count, block)
+        return block
+
     def solve(self, right: np.ndarray) -> np.ndarray:
         """K⁻¹ b of right-hand sides (q,) or (q, k)."""
         side = np.array(right, float, order="C")
@@ -86,6 +95,13 @@ class Factor:
         if side.size and self.plan.library.cholesky_solve(self.address, side, side.size // len(side)):
             raise MemoryError("too little memory for a solution")
         return side
+
+
+def whole_factor(matrix: sparse.csc_array) -> Factor:
+    """The factor of one matrix, in double precision; its variables in a good order of elimination."""
+    even = sparse.csc_array(0.5 * (matrix + matrix.T))  # what cancels may be stored in one half only
+    even.sort_indices()
+    return Plan(even).factor(even, single=False)
 
 
 @cache

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg, sparse
 from scipy.linalg.blas import dsymv
-from scipy.sparse.linalg import SuperLU, splu
 
 from pipeline.core.problem import BondLaw
 from pipeline.equilibrium.assembly import Assembly, assembly
 from pipeline.equilibrium.cholesky import Plan, available
-from pipeline.equilibrium.factor import Solve, factorise, rough_solve
-from pipeline.equilibrium.far import FarField, exact_solve
+from pipeline.equilibrium.factor import Solve, factorise_elastic, rough_solve, singular
+from pipeline.equilibrium.far import FarField, factorise_far
 from pipeline.equilibrium.islands import Islands, joined, no_islands
-from pipeline.equilibrium.model import State, WholeModel
+from pipeline.equilibrium.model import ElasticResponse, State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
+from pipeline.equilibrium.schur import schur_complement
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.memory import CentralMemory, MixedMemory, at_rest
 from pipeline.materials.mixed_softening import MixedSoftening
@@ -86,6 +86,16 @@ class CondensedNetwork:
             return np.append(strip(right[: self.kept]), linalg.cho_solve(factor, last, check_finite=False))
 
         return solve
+
+    def exact(self, weight: np.ndarray) -> Solve:
+        """Displacements (q,), m, under forces (q,), N, without islands; refuses what can move without resistance."""
+        inner, _ = self._blocks(weight)
+        if self.plan is None:
+            return factorise_elastic(inner).solve
+        factor = self.plan.factor(inner, single=False)
+        if factor.raised:
+            raise singular()
+        return factor.solve
 
     def _blocks(self, weight: np.ndarray) -> tuple[sparse.csc_array, np.ndarray]:
         """Stiffnesses of the strip and of the islands, N/m, for bonds of `weight` (m,), N/m."""
@@ -159,6 +169,17 @@ class CondensedModel:
         every[self.far.inner] = self.far.follow(kept, machine, self.network.islands, extra)
         return every
 
+    def elastic(self) -> ElasticResponse:
+        """How the undamaged whole answers a motion of the machine."""
+        network, stiffness = self.network, at_rest(self.law).trial(0.0).elastic
+        still = np.zeros(self.gauge.size)
+        pull, _ = network.pull(stiffness * network.opening(still, 1.0), still, 1.0)
+        own = -network.exact(stiffness)(pull)
+        _, load = network.pull(stiffness * network.opening(own, 1.0), own, 1.0)
+        free = self.complete(own, 1.0)
+        cmod = float(self.gauge @ own) + self.gauge_drive
+        return ElasticResponse(free, load, cmod, self.whole.network.opening(free, 1.0))
+
     def reduce(self, state: State) -> State:
         """A state of the whole model in the variables of this one."""
         kept, islands, memory = state.free[self.kept], self.network.islands, _divisible_memory(state)
@@ -218,8 +239,8 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     pull, load = rigid.pull(elastic * rigid.drive, whole.gauge, 0.0)
     kept = kept[_order(network, followed, kept, stiffness)]
     inside = stiffness[inner][:, inner].tocsc()
-    factor = factorise(inside)
-    far = FarField(inner, exact_solve(inside, factor), stiffness[inner][:, kept].tocsr(), pull[inner])
+    factor, solve = factorise_far(inside)
+    far = FarField(inner, solve, stiffness[inner][:, kept].tocsr(), pull[inner])
     edge = np.flatnonzero(np.diff(stiffness[kept].indptr))
     held = kept[edge]
     outer = sparse.block_array([[stiffness[held][:, held], pull[held, None]], [pull[None, held], [[load]]]]).tocsc()
@@ -289,38 +310,10 @@ def _divide(network: SmallNetwork, followed: np.ndarray, gauge: np.ndarray) -> t
     return np.flatnonzero(needed), np.flatnonzero(~needed)
 
 
-def schur_complement(
-    inside: sparse.csc_array, across: sparse.csc_array, outer: sparse.csc_array, factor: SuperLU
-) -> np.ndarray:
-    """D − Bᵀ A⁻¹ B (b, b) of symmetric [[A, B], [Bᵀ, D]], with A factorised.
-
-    It is the last block of the factors of the whole matrix with D ordered last, at the price of one
-    factorisation instead of b solutions. D is made heavier before and lighter after: the whole may be singular.
-    """
-    order, start = np.argsort(factor.perm_c), inside.shape[0]
-    ballast = 2 * np.abs(outer.diagonal()) + np.abs(outer.diagonal()).mean()
-    matrix = sparse.block_array(
-        [[inside[order][:, order], across[order]], [across[order].T, outer + sparse.diags_array(ballast)]]
-    ).tocsc()
-    whole = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    last = whole.perm_c[start:]
-    if last.min() < start:  # the elimination tree has several roots and was ordered otherwise
-        schur = outer.toarray() - across.T @ factor.solve(across.toarray())
-        return 0.5 * (schur + schur.T)
-    schur = (whole.L.tocsr()[last][:, start:] @ whole.U.tocsr()[start:][:, last]).toarray()
-    schur[np.diag_indices_from(schur)] -= ballast
-    return 0.5 * (schur + schur.T)
-
-
 def _order(network: SmallNetwork, followed: np.ndarray, kept: np.ndarray, far: sparse.csr_array) -> np.ndarray:
     """A good order of elimination (q,) of the kept variables, those on the edge being all coupled.
 
     `far` (all, all) is the stiffness of the other bonds.
     """
     edge = np.flatnonzero(np.diff(far[kept].indptr))
-    bonds = network.part(followed, kept)
-    frame = assembly(bonds.jacobian, edge)
-    # its pattern counts alone, with entries that cancel in some stiffness: ones, and a diagonal that dominates them
-    size = kept.size
-    pattern = sparse.csc_array((np.ones(frame.indices.size), frame.indices, frame.indptr), shape=(size, size))
-    return np.argsort(factorise(pattern + 2 * size * sparse.eye_array(size, format="csc")).perm_c)
+    return assembly(network.part(followed, kept).jacobian, edge).order()

@@ -30,15 +30,20 @@ def factorise_elastic(stiffness: sparse.csc_array) -> SuperLU:
     """
     try:
         factor = factorise(stiffness)
-        pivots = np.abs(factor.U.diagonal())
     except RuntimeError:
-        pivots = np.zeros(1)
+        raise singular() from None
+    pivots = np.abs(factor.U.diagonal())
     if not pivots.min() > 1e-13 * pivots.max():
-        raise InputError(
-            "the elastic stiffness of the specimen is singular: the grips must stop every rigid motion and every "
-            "particle needs at least two bonds that are not in line"
-        )
+        raise singular()
     return factor
+
+
+def singular() -> InputError:
+    """What is said of a specimen that can move without resistance."""
+    return InputError(
+        "the elastic stiffness of the specimen is singular: the grips must stop every rigid motion and every "
+        "particle needs at least two bonds that are not in line"
+    )
 
 
 def rough_solve(stiffness: sparse.csc_array, ordered: bool = False) -> Solve:
@@ -52,3 +57,14 @@ def rough_solve(stiffness: sparse.csc_array, ordered: bool = False) -> Solve:
     )
     factor = splu(single, permc_spec=order, diag_pivot_thresh=0.0, options=SYMMETRIC)
     return lambda right: factor.solve(right.astype(np.float32)).astype(float)
+
+
+def reordered(solve: Solve, order: np.ndarray) -> Solve:
+    """Solutions (q,) or (q, k) with a matrix that was factorised with its variables in another order (q,)."""
+
+    def solution(right: np.ndarray) -> np.ndarray:
+        found = np.empty(right.shape)
+        found[order] = solve(right[order])
+        return found
+
+    return solution

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU
 
-from pipeline.equilibrium.cholesky import Plan, available
-from pipeline.equilibrium.factor import Solve
+from pipeline.equilibrium.cholesky import available, whole_factor
+from pipeline.equilibrium.factor import Solve, factorise, factorise_elastic, reordered, singular
 from pipeline.equilibrium.islands import Islands
 
 BATCH = 64  # right-hand sides at a time
@@ -42,21 +42,23 @@ class FarField:
         return np.hstack(parts)
 
 
-def exact_solve(stiffness: sparse.csc_array, factor: SuperLU) -> Solve:
-    """Solutions (q,) or (q, k) with a factorised matrix, by the compiled library where it was built."""
+def factorise_far(stiffness: sparse.csc_array) -> tuple[SuperLU, Solve]:
+    """The factorised stiffness K_ff, and solutions with it by the compiled library where it was built.
+
+    Raises
+    ------
+    InputError
+        if it is singular: particles that may move although all kept ones are held
+    """
     if not available():
-        return factor.solve
+        slow = factorise_elastic(stiffness)
+        return slow, slow.solve
+    try:
+        factor = factorise(stiffness)
+    except RuntimeError:
+        raise singular() from None
     order = np.argsort(factor.perm_c)
-    ordered = stiffness[order][:, order]
-    ordered = (0.5 * (ordered + ordered.T)).tocsc()  # what cancels may be stored in one half only
-    ordered.sort_indices()
-    faster = Plan(ordered).factor(ordered, single=False)
-    if faster.raised:  # not positive definite: pivots of any sign do better
-        return factor.solve
-
-    def solve(right: np.ndarray) -> np.ndarray:
-        found = np.empty(right.shape)
-        found[order] = faster.solve(right[order])
-        return found
-
-    return solve
+    faster = whole_factor(stiffness[order][:, order])
+    if faster.raised:
+        raise singular()
+    return factor, reordered(faster.solve, order)

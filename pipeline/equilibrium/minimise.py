@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg.blas import daxpy
 
-MEMORY = 12  # pairs of steps kept; physics of softening bonds gains nothing beyond
+MEMORY = 8  # pairs of steps kept; twelve need as many iterations, six a few more
 
 
 class Preconditioner(Protocol):

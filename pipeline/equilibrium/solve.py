@@ -88,7 +88,9 @@ class _Journey:
         snap_back: bool,
     ):
         self.whole = whole_model(problem)
-        elastic = Stepper(self.whole).elastic()
+        chosen = active.strip(problem)
+        part = condense(self.whole, chosen) if condensed and active.pays(problem, chosen) else None
+        elastic = part.elastic() if part else Stepper(self.whole).elastic()
         self.record = Record(problem)
         self.model: WholeModel | CondensedModel = self.whole
         strongest = float(np.abs(problem.law.k_n * elastic.deformation[: problem.bonds.count]).max())
@@ -102,9 +104,8 @@ class _Journey:
         self.watch, self.looked = Watch(), 1
         self.ahead: list[State] = []
         self.safe = (self.before, self.state, self.path)
-        chosen = active.strip(problem)
-        if condensed and active.pays(problem, chosen):
-            self._adopt(condense(self.whole, chosen))
+        if part:
+            self._adopt(part)
 
     def step(self) -> None:
         """One increment; if it is time, a look at the far bonds, which may take increments back."""

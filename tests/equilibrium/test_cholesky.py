@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from pipeline.core.units import MM
-from pipeline.equilibrium import cholesky, condensation, far
+from pipeline.equilibrium import cholesky, condensation, far, network, schur
 from pipeline.equilibrium.cholesky import Plan
 from pipeline.equilibrium.solve import solve
 
@@ -94,9 +94,11 @@ def test_the_engine_finds_the_same_without_the_library(monkeypatch: pytest.Monke
     problem = fracture_test(radius=1 * MM, scatter=0.6)
     problem = replace(problem, cmod_max=0.1 * MM, stations=np.array([0.05, 0.09]) * MM)
     fast = solve(problem, tolerance=1e-5)
-    for module in (condensation, far):
+    for module in (condensation, far, network, schur):
         monkeypatch.setattr(module, "available", lambda: False)
     slow = solve(problem, tolerance=1e-5)
     at = np.linspace(0.005, 0.095, 40) * MM
-    assert fast.curve.load_at(at) == pytest.approx(slow.curve.load_at(at), rel=1e-4)  # residual of 1e-5 f_max
+    peak = slow.curve.load.max()
+    # residual of 1e-5 f_max; round-off decides whether an increment is repeated, which moves what is interpolated
+    assert fast.curve.load_at(at) == pytest.approx(slow.curve.load_at(at), abs=5e-4 * peak)
     assert fast.displacement == pytest.approx(slow.displacement, abs=1e-4 * np.abs(slow.displacement).max())

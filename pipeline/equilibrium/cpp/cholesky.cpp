@@ -37,6 +37,8 @@ void cholesky_free_factor(CholeskyFactor *factor) { delete factor; }
 
 int64_t cholesky_raised(const CholeskyFactor *factor) { return factor->raised; }
 
+void cholesky_last(const CholeskyFactor *factor, int64_t count, double *last) { factor->last(count, last); }
+
 int32_t cholesky_solve(const CholeskyFactor *factor, double *side, int64_t count) {
   try {
     factor->solve(side, count);

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#define CHOLESKY_INTERFACE 1
+#define CHOLESKY_INTERFACE 2
 #define CHOLESKY_API __attribute__((visibility("default")))
 
 extern "C" {
@@ -34,6 +34,9 @@ CHOLESKY_API void cholesky_free_factor(CholeskyFactor *factor);
 
 // How many pivots were raised.
 CHOLESKY_API int64_t cholesky_raised(const CholeskyFactor *factor);
+
+// The last (count, count) numbers of the factor, row by row, zero above the diagonal.
+CHOLESKY_API void cholesky_last(const CholeskyFactor *factor, int64_t count, double *last);
 
 // Solves in place of `count` right-hand sides, (n, count) numbers row by row. Nonzero if memory fails.
 CHOLESKY_API int32_t cholesky_solve(const CholeskyFactor *factor, double *side, int64_t count);

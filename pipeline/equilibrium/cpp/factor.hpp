@@ -14,6 +14,7 @@ struct CholeskyFactor {
 
   virtual ~CholeskyFactor() = default;
   virtual void solve(double *side, int64_t count) const = 0;
+  virtual void last(int64_t count, double *last) const = 0;
 };
 
 namespace cholesky {
@@ -52,6 +53,18 @@ class Factor : public CholeskyFactor {
         backward(*front, x, part, static_cast<int>(count));
     }
     std::copy(x, x + count * plan_.size, side);
+  }
+
+  void last(int64_t count, double *last) const override {
+    const int64_t skipped = plan_.size - count;
+    std::fill(last, last + count * count, 0.0);
+    for (const Front &front : plan_.front)
+      for (int64_t j = std::max<int64_t>(0, skipped - front.first); j < front.columns; ++j) {
+        const T *column = panel(front) + j * front.height();
+        double *into = last + (front.first + j - skipped);
+        for (int64_t i = j; i < front.columns; ++i) into[(front.first + i - skipped) * count] = column[i];
+        for (int64_t i = 0; i < front.below; ++i) into[(rows(front)[i] - skipped) * count] = column[front.columns + i];
+      }
   }
 
  private:
