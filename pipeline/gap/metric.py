@@ -68,6 +68,13 @@ class Metric:
         terms = -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=1)
         return float(logsumexp(terms) - np.log(SCALES))
 
+    def draws(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Data (n, count) of a model that lacks nothing; where the scale of S is unknown each has one of its own."""
+        whitening, share = self._root
+        factor = np.ones(count) if not share.any() else self.tail / rng.chisquare(self.tail, count)
+        spread = np.sqrt(1 + share[:, None] * (factor - 1))
+        return self.covariance @ whitening.T @ (spread * rng.standard_normal((share.size, count)))
+
     def part(self, keep: np.ndarray) -> Metric:
         """The metric of some of the data, (n,) bool."""
         some = np.ix_(keep, keep)
