@@ -20,6 +20,7 @@ from pipeline.store.results import prepare_output, write_arrays, write_result
 from pipeline.store.simulation import SimulationStore
 from pipeline.study.agreement import Check, curve_difference, field_difference, order_of_convergence
 from pipeline.study.closed_forms import closed_form_checks
+from pipeline.study.creep_trials import MASTIC
 from pipeline.study.cross_check_page import cross_check_page
 from pipeline.study.engines import FORWARD, engine
 from pipeline.study.observation import observe_solution
@@ -144,10 +145,11 @@ def cross_check(
 
 def _specimens(full: bool, seed: int) -> list[Trial]:
     sliding = section_trial("dct", 1.8, seed, 90.0, SLIDING)
+    creeping = section_trial("seb", 1.2, seed, mastic=MASTIC)
     if not full:
         first = section_trial("dct", 1.8, seed), section_trial("seb", 1.2, None, 0.0), section_trial("seb", 1.2, seed)
-        return [*first, sliding]
-    return [sliding, section_trial("seb", 0.6, seed, 90.0, SLIDING)] + [
+        return [*first, sliding, creeping]
+    return [sliding, creeping, section_trial("seb", 0.6, seed, 90.0, SLIDING)] + [
         section_trial(geometry, radius, section, angle)
         for geometry, radius in (("seb", 0.6), ("dct", 1.2))
         for section in (seed, seed + 1, seed + 2, None)

@@ -12,11 +12,14 @@ from pipeline.core.particles import Bonds, Particles, Phase
 from pipeline.core.problem import Gauge, Grip, Kinematics, Problem, Role
 from pipeline.core.specimen import SingleEdgeNotchedBeam
 from pipeline.core.units import MM
+from pipeline.materials.burgers import Burgers
 from pipeline.materials.cohesive import LinearSoftening
 from pipeline.store.bundle import read_bundle
+from pipeline.store.creep import CreepRecord
 from pipeline.store.new import Contents
 from pipeline.store.start import start_parameters
-from pipeline.study.assembly import build_model
+from pipeline.study.assembly import CREEPING, build_model
+from pipeline.study.creep_trials import READINGS
 from pipeline.study.virtual_test import Request, prepare, write_bundle
 
 CMOD_MAX = {"seb": 0.55 * MM, "dct": 0.6 * MM}
@@ -47,7 +50,12 @@ class Trial:
 
 
 def section_trial(
-    geometry: str, radius_mm: float, seed: int | None, angle_deg: float = 90.0, poissons_ratio: float = 0.25
+    geometry: str,
+    radius_mm: float,
+    seed: int | None,
+    angle_deg: float = 90.0,
+    poissons_ratio: float = 0.25,
+    mastic: Burgers | None = None,
 ) -> Trial:
     """A test of a synthetic section with the paper's properties.
 
@@ -58,19 +66,25 @@ def section_trial(
     seed : int, of the section; None: mastic throughout
     angle_deg : float; direction of the close-packed rows against x, 90 along the crack
     poissons_ratio : float; below 1/4 bonds slide, weaker and further than they open, and particles rotate
+    mastic : Burgers; how the mastic creeps, if it does, in the time of the paper's test
     """
     experiment, images = prepare(Request(geometry), geometry, np.random.default_rng(seed or 0))
     turned = experiment.model.model_copy(update={"lattice_angle_deg": angle_deg})
     sliding = {"shear_strength_ratio": 0.7, "shear_opening_ratio": 1.2} if poissons_ratio < 0.25 else {}
     material = experiment.material.model_copy(update={"poissons_ratio": poissons_ratio, **sliding})
     experiment = experiment.model_copy(update={"model": turned, "material": material})
+    contents = images if seed is not None else Contents()
+    if mastic is not None:
+        contents = replace(contents, creep=CreepRecord(READINGS, mastic.creep_compliance(READINGS)))
     with tempfile.TemporaryDirectory() as folder:
-        write_bundle(Path(folder), experiment, images if seed is not None else Contents())
+        write_bundle(Path(folder), experiment, contents)
         bundle = read_bundle(Path(folder))
         model = build_model(bundle, radius_mm * MM)
-        problem = model.problem(*start_parameters(bundle), cmod_max=CMOD_MAX[geometry])
+        law = None if mastic is None else CREEPING
+        problem = model.problem(*start_parameters(bundle), cmod_max=CMOD_MAX[geometry], law=law)
     what = "homogeneous" if seed is None else f"section {seed}"
     name = f"{geometry}, {what}, {radius_mm:g} mm, {angle_deg:g}°" + (", sliding" if sliding else "")
+    name += "" if mastic is None else ", creeping"
     return Trial(name, problem, bundle.observation_points)
 
 
