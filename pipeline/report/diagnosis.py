@@ -51,7 +51,36 @@ def where_map(axes: Axes, cells: Sequence[Mapping[str, Any]], stage: str, agains
     axes.tick_params(length=0)
     axes.set_title(stage)
     if stage == STAGES[-1]:
-        colour_bar(axes, image, "× expected")
+        ticks = [t for t in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if t <= worst]
+        bar = colour_bar(axes, image, "× expected")
+        bar.set_yticks(ticks, [str(t) for t in ticks])
+        bar.minorticks_off()
+    return axes
+
+
+def load_difference(axes: Axes, observation: Observation, reading: Reading, std: np.ndarray) -> Axes:
+    """Measured minus simulated load at every station, beside what noise and engines give.
+
+    Parameters
+    ----------
+    observation : Observation
+    reading : Reading of the simulation
+    std : (s,) array, N; of noise and discrepancy, NaN where nothing is judged
+    """
+    at, left = observation.sight.cmod / MM, observation.reading.load - reading.load
+    for width, label in ((2 * std, "± 2 std of noise and engines"), (2 * observation.load_std, "± 2 std of noise")):
+        axes.fill_between(at, -width, width, alpha=0.45, linewidth=0, label=label,
+                          color=LIGHT if label.endswith("engines") else GREY)  # fmt: skip
+    axes.plot(at, left, "o-", ms=3, color=ORANGE, label="measured − simulated")
+    axes.axhline(0, color=GREY, linewidth=0.6)
+    starts = np.flatnonzero(np.diff(observation.sight.stage, prepend=-1))
+    for k, place in enumerate(starts):  # what comes before the peak is short: it ends where the next begins
+        early = k == 0 and starts.size > 1
+        x, name = at[starts[1] if early else place], STAGES[observation.sight.stage[place]]
+        axes.text(x, 1.01, f"{name}  " if early else name, fontsize=6, color=GREY, ha="right" if early else "left",
+                  va="bottom", transform=axes.get_xaxis_transform())  # fmt: skip
+    axes.set(xlabel="CMOD (mm)", ylabel="difference of load (N)")
+    axes.legend(fontsize=6, loc="best")
     return axes
 
 
@@ -130,7 +159,8 @@ def closures(axes: Axes, found: Mapping[str, Mapping[str, Any]]) -> Axes:
     ticks = {}
     for place, (label, row) in enumerate(list(found.items())[::-1]):
         ticks[place] = _broken(label)
-        parts = {"all data": row, **row.get("channels", {})}
+        channels = row.get("channels", {})
+        parts = {"all data": row, **(channels if len(channels) > 1 else {})}
         for k, (name, part) in enumerate(parts.items()):
             if part["fraction"] is None:
                 continue

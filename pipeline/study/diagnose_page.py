@@ -18,6 +18,7 @@ from pipeline.report.diagnosis import (
     detectability,
     difference_map,
     differences,
+    load_difference,
     loads,
     ranking,
     short,
@@ -147,6 +148,11 @@ def percent(share: float) -> str:
 def _where(folder: Path, d: Diagnosis, result: Mapping[str, Any]) -> Section:
     cells = result["where"]
     figures = where_figures(folder, cells)
+    if d.observation.has_load:
+        before, told = reading_of(d, d.fits[NONE]), "Load of the model as it is: difference at every station."
+        figures.append(
+            picture(folder, "where_load", lambda a: load_difference(a, d.observation, before, load_std(d)), told)
+        )
     if d.observation.has_field:
         figures.insert(0, _arrows(folder, d))
     return Section("Where test and simulation part", text=where_told(cells), figures=figures)
@@ -166,7 +172,9 @@ def where_told(cells: list[dict[str, Any]]) -> str:
 
 def where_figures(folder: Path, cells: list[dict[str, Any]]) -> list[Figure]:
     """Maps of region × mode by stage, against what engines differ by and against noise."""
-    figures = []
+    figures: list[Figure] = []
+    if not any(c["channel"] == "field" for c in cells):
+        return figures
     for against, words in (("z_gap", "noise and engine discrepancy"), ("z_noise", "noise alone")):
         panels = [_panel(cells, stage, against) for stage in STAGES]
         data = png(*panels, columns=3, **WIDE)
