@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.bundles import DELTA_MAX, F_MAX, edit, make_bundle
+from helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment, edit, make_bundle
 
+from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import InputError
 from pipeline.materials.burgers import Burgers
 from pipeline.store.creep import CreepRecord
+from pipeline.store.new import Contents, write_bundle
+from pipeline.study.assembly import test_clock as clock_of  # no test
 from pipeline.study.identify import identify
+from pipeline.study.simulate import simulate
 
 GPA = 1e9
 MASTIC = Burgers(0.1 / GPA, 0.04 / GPA, 1500 * GPA, 15.0)
@@ -45,6 +50,30 @@ def test_the_viscoelastic_fit_finds_the_truth_and_the_elastic_one_more_strength(
     low, high = with_creep["interval_95"]["f_max_n"]
     assert low < F_MAX < high
     assert without["f_max_n"] > 1.05 * with_creep["f_max_n"]
+
+
+@pytest.mark.parametrize("rest", [0.0, 30.0])
+def test_the_clock_starts_when_the_mouth_opens(rest):
+    """What a specimen waits for, unloaded, before the machine starts is no time to creep in."""
+    time = np.arange(0.0, rest + 60.0, 0.2)
+    cmod = 8e-6 * np.maximum(time - rest, 0.0)
+    clock = clock_of(SimpleNamespace(curve=LoadCurve(time, cmod, 1e7 * cmod)))
+    assert clock.at(3e-4) == pytest.approx(3e-4 / 8e-6, abs=0.01)  # between two rows the mouth opens evenly
+    assert clock.at(1e-6) == pytest.approx(1e-6 / 8e-6, abs=0.2)  # within a row of the start
+
+
+def test_a_creeping_test_is_simulated_in_equilibria(tmp_path):
+    """The command with --law burgers: less load than without, most of it late."""
+    loads = []
+    bundle = tmp_path / "beam"
+    write_bundle(bundle, coarse_experiment("beam"), Contents(creep=record()))
+    for law in ("burgers", None):
+        out = tmp_path / str(law)
+        simulate(bundle, out, f_max=F_MAX, delta_max=DELTA_MAX, law=law, engine="equilibrium")
+        result = json.loads((out / "result.json").read_text("utf-8"))
+        assert result["energy_error"] < 1e-3
+        loads.append(result["peak_load_n"])
+    assert 0.9 * loads[1] < loads[0] < loads[1]
 
 
 def test_a_bundle_without_creep_is_refused_before_anything_runs(tmp_path):
