@@ -63,27 +63,33 @@ def diagnose(
     started = time.monotonic()
     if len(read) == 1:
         case = prepared(read[0], results_folder(out, read[0]), chosen, settings, progress)
-        return sentence(judged(case, chosen, settings.seed, names, grid or FACTORS, started))
+        return sentence(judged(case, chosen, settings.seed, names, grid or FACTORS, started)[0])
     places = folders(read)
     folder = joint_folder(out, list(places))
-    cases, found = {}, []
+    cases, found, warned = {}, [], {}
     for name, bundle in places.items():
         progress.stage(name)
         began = time.monotonic()
         cases[name] = prepared(bundle, results_folder(folder / name, bundle), chosen, settings, progress)
-        found.append(judged(cases[name], chosen, settings.seed, names, grid or FACTORS, began))
+        diagnosis, warned[name] = judged(cases[name], chosen, settings.seed, names, grid or FACTORS, began)
+        found.append(diagnosis)
     joint = together(
         [_test(name, case, d) for (name, case), d in zip(cases.items(), found, strict=True)],
         np.random.default_rng(settings.seed),
     )
-    conclude(folder, cases, joint, chosen, time.monotonic() - started)
+    conclude(folder, cases, joint, warned, chosen, time.monotonic() - started)
     return sentence_together(joint)
 
 
 def judged(
     case: Case, engine: str, seed: int, names: Sequence[str], grid: tuple[float, ...], started: float
-) -> Diagnosis:
-    """Diagnose one test and write its results; the clock stood at `started` (s) when work on it began."""
+) -> tuple[Diagnosis, list[str]]:
+    """Diagnose one test and write its results; the clock stood at `started` (s) when work on it began.
+
+    Returns
+    -------
+    the diagnosis, and what must be known before it is read
+    """
     look, radius, geometry = case.look, case.model.particles.radius, case.bundle.specimen.geometry
     entry = nearest(shipped(), geometry, radius)
     warnings = [*entry.warnings(geometry, radius, look.observation), *unlearnt(case.model)]
@@ -97,17 +103,23 @@ def judged(
     from pipeline.study.diagnose_page import diagnosis_page
 
     diagnosis_page(case, diagnosis, result)
-    return diagnosis
+    return diagnosis, result["warnings"]
 
 
 def unlearnt(model: Model) -> list[str]:
-    """Warns of bonds of another kind than those that the library of discrepancies was learnt with."""
-    if not model.mixture.shear_ratio:
-        return []
-    return [
-        f"bonds carry shear at poissons_ratio = {model.mixture.poissons_ratio:g}; the library of discrepancies was "
-        "learnt on bonds that carry none: what honest models differ by may be larger here than the gate allows for"
-    ]
+    """Warns of a model of another kind than those that the library of discrepancies was learnt with."""
+    found = []
+    if model.mixture.shear_ratio:
+        found.append(
+            f"bonds carry shear at poissons_ratio = {model.mixture.poissons_ratio:g}; the library of discrepancies was "
+            "learnt on bonds that carry none: what honest models differ by may be larger here than the gate allows for"
+        )
+    if model.phase_map is None:
+        found.append(
+            "the model is one material throughout; the library of discrepancies was learnt on specimens with stones: "
+            "what honest models differ by is another thing here, in the load above all"
+        )
+    return found
 
 
 def _test(name: str, case: Case, diagnosis: Diagnosis) -> Test:
@@ -116,9 +128,11 @@ def _test(name: str, case: Case, diagnosis: Diagnosis) -> Test:
     return Test(name, diagnosis, bond_area(case.bundle), condition, case.simulator)
 
 
-def conclude(folder: Path, cases: dict[str, Case], joint: Together, engine: str, seconds: float) -> None:
+def conclude(
+    folder: Path, cases: dict[str, Case], joint: Together, warned: dict[str, list[str]], engine: str, seconds: float
+) -> None:
     """Write what several tests say together."""
-    result = together_result(cases, joint) | {"seconds": seconds, "engine": engine}
+    result = together_result(cases, joint, warned) | {"seconds": seconds, "engine": engine}
     result["seconds_simulating"] = sum(sum(c.simulator.spent) for c in cases.values())
     write_result(folder, result)
     from pipeline.study.diagnose_together_page import together_page

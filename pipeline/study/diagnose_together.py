@@ -44,8 +44,8 @@ def folders(bundles: Sequence[Bundle]) -> dict[str, Bundle]:
     raise InputError("two bundles have the same name: change `name` in one experiment.toml, or give each bundle once")
 
 
-def together_result(cases: Mapping[str, Case], joint: Together) -> dict[str, Any]:
-    """What result.json of several bundles holds, but for the time taken and the engine."""
+def together_result(cases: Mapping[str, Case], joint: Together, warned: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """What result.json of several bundles holds, but for the time taken and the engine; `warned`: of each alone."""
     j, diagnoses = joint, [t.diagnosis for t in joint.tests]
     best = j.scored.ranked()[0]
     area = joint.tests[0].area
@@ -79,7 +79,7 @@ def together_result(cases: Mapping[str, Case], joint: Together) -> dict[str, Any
         "noise_bic": _summed([d.noise_bic for d in diagnoses]),
         "separate_by": remedies(j.scored, j.card, j.verdict, j.untested),
         "equivalents": {n: list(e.equivalents) for n, e in library().items() if e.equivalents},
-        "warnings": [*warnings_together(cases), *own_warnings(j.card, False)],
+        "warnings": [*warnings_together(cases), *own_warnings(j.card, False), *warnings_of_each(warned)],
         "remarks": remarks_together(cases),
         "simulations": sum(d.runs for d in diagnoses),
         "data": int(sum(d.data.target.size for d in diagnoses)),
@@ -200,6 +200,15 @@ def warnings_together(cases: Mapping[str, Case]) -> list[str]:
                 f"{what} differ: f_max and delta_max are carried from test to test as if the material were the same"
             )
     return found
+
+
+def warnings_of_each(warned: Mapping[str, Sequence[str]]) -> list[str]:
+    """What must be known of single tests, by name where not of all."""
+    found: dict[str, list[str]] = {}
+    for name, sentences in warned.items():
+        for sentence in sentences:
+            found.setdefault(sentence, []).append(name)
+    return [told if len(names) == len(warned) else f"{', '.join(names)}: {told}" for told, names in found.items()]
 
 
 def remarks_together(cases: Mapping[str, Case]) -> list[str]:

@@ -19,7 +19,7 @@ from pipeline.store.bundle import read_bundle
 from pipeline.store.fields import read_fields, write_fields
 from pipeline.study.diagnose import diagnose
 from pipeline.study.diagnose_sight import abscissae, clear_of, crack_path, own_path, seen, sides
-from pipeline.study.diagnose_together import folders
+from pipeline.study.diagnose_together import folders, warnings_of_each
 from pipeline.study.virtual_test import virtual_test
 
 BEAM = SingleEdgeNotchedBeam(60e-3, 130e-3, 137e-3, 40e-3, 15e-3)
@@ -83,6 +83,7 @@ def test_replicates_are_read_together_and_predict_each_other(bundle, tmp_path):
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert set(result) >= KEYS | {"bundles", "transfer"}
     assert "2 tests" in told
+    assert any("particles of 2 mm" in w for w in result["warnings"])
     alone = [json.loads((tmp_path / "out" / n / "result.json").read_text("utf-8")) for n in ("let-go", "other")]
     for label in ("none", "fixture_compliance_um_per_kn", "modulus"):
         middle = np.median([r["log_bayes"][label] for r in alone])
@@ -95,6 +96,11 @@ def test_replicates_are_read_together_and_predict_each_other(bundle, tmp_path):
     assert (tmp_path / "out" / "report.html").exists()
     with pytest.raises(InputError, match="holds the results of bundle 'let-go \\+ other'"):
         diagnose([bundle], tmp_path / "out")
+
+
+def test_warnings_of_single_tests_are_passed_on_by_name():
+    told = warnings_of_each({"a": ["hot", "old"], "b": ["old"], "c": ["old", "wet"]})
+    assert told == ["a: hot", "old", "c: wet"]
 
 
 def test_two_bundles_of_one_name_are_told_apart_by_their_folders(bundle, tmp_path):
