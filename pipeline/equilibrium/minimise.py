@@ -80,6 +80,7 @@ def minimise(
     constraint: np.ndarray | None = None,
     limit: int = 400,
     patience: int = 25,
+    reach: float = np.inf,
 ) -> Minimum:
     """Go downhill from `start` until no entry of the gradient exceeds `tolerance`.
 
@@ -96,6 +97,7 @@ def minimise(
     tolerance : float, in units of the gradient
     constraint : (q,) array, optional; its product with q stays what it is at `start`
     limit : int; iterations after which to give up
+    reach : float; how far one step may change an entry before its length is searched
     """
     project = _Projection(preconditioner, constraint)
     curvature = _Curvature(project.solve)
@@ -104,6 +106,7 @@ def minimise(
         free, multiplier = project.split(slope)
         residual = float(np.abs(free).max(initial=0.0))
         descent = curvature.descent(free)
+        descent *= min(1.0, reach / max(float(np.abs(descent).max(initial=0.0)), 1e-300))
         if residual <= tolerance or iteration == limit:
             break
         if iteration and iteration % patience == 0:

@@ -119,6 +119,8 @@ class Path:
         rough = None
         for halving in range(HALVINGS + 1):
             found = self._attempt(before, state, wanted / 2**halving)
+            if found is not None and self._gained(state, found):
+                found = self._attempt(before, state, wanted / 2**halving, self.stepper.careful())
             if found is not None and self._smooth(state, found):
                 return found
             rough = found or rough
@@ -137,8 +139,15 @@ class Path:
     def _smooth(self, state: State, found: State) -> bool:
         """Whether the load changed little and no energy was set free, as it is when a crack jumps."""
         little = self.increments.leap * self.peak * (1 + 1e-6)  # elastic increments grow to just that: no tie
-        lost = abs(_lost(state, found))
-        return abs(found.load - state.load) <= little and lost <= 0.02 * little * abs(found.cmod - state.cmod)
+        return abs(found.load - state.load) <= little and abs(_lost(state, found)) <= self._noise(state, found)
+
+    def _gained(self, state: State, found: State) -> bool:
+        """Whether bonds hold or have used up more than the machine gave: no specimen goes there by itself."""
+        return _lost(state, found) < -self._noise(state, found)
+
+    def _noise(self, state: State, found: State) -> float:
+        """Energy (J) that the trapezoid of an increment may miss."""
+        return 0.02 * self.increments.leap * self.peak * abs(found.cmod - state.cmod)
 
     def _choose_control(self, before: State, state: State) -> None:
         """Leave machine control where machine displacement hardly grows with CMOD; go back where it does again."""
@@ -146,22 +155,24 @@ class Path:
         gain = (state.machine - before.machine) / (opened * self._stiff) if opened > 0 else 0.0
         self.gauge_controlled = self.snap_back and gain < (0.1 if self.gauge_controlled else 0.02)
 
-    def _attempt(self, before: State, state: State, wanted: float) -> State | None:
+    def _attempt(self, before: State, state: State, wanted: float, by: Stepper | None = None) -> State | None:
         if not self.gauge_controlled:
-            return self._machine(before, state, wanted, 3 * wanted)
+            return self._machine(before, state, wanted, 3 * wanted, by)
         share = wanted / (state.cmod - before.cmod)
         guess = state.free + share * (state.free - before.free)
         machine = state.machine + share * (state.machine - before.machine)
-        return self.stepper.by_gauge(state, guess, machine, state.cmod + wanted)
+        return (by or self.stepper).by_gauge(state, guess, machine, state.cmod + wanted)
 
-    def _machine(self, before: State, state: State, wanted: float, allowed: float) -> State | None:
+    def _machine(
+        self, before: State, state: State, wanted: float, allowed: float, by: Stepper | None = None
+    ) -> State | None:
         """A machine step that is expected to open the mouth by `wanted`; None where it opens more than allowed."""
         share = wanted / (state.cmod - before.cmod)
         guess = state.free + share * (state.free - before.free)
         machine = state.machine + share * (state.machine - before.machine)
         if machine <= state.machine:
             return None
-        found = self.stepper.by_machine(state, guess, machine)
+        found = (by or self.stepper).by_machine(state, guess, machine)
         opened = found is not None and 0 < found.cmod - state.cmod <= allowed
         return found if opened else None
 

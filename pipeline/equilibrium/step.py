@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from pipeline.materials.memory import at_rest
 
 CORRECTIONS = 8  # of the duration of an increment under machine control
 PUNCTUAL = 5e-3  # share of an increment's duration by which it may miss the clock; the next one makes up for it
+CAREFUL = 0.25  # of the largest δ_max: a bond that is opened so far in one step still pulls back
 
 
 @dataclass
@@ -29,6 +30,7 @@ class Stepper:
     patience : int; iterations after which a minimisation renews its factorisation
     endurance : int; iterations after which the next minimisation begins with a new one
     clock : Clock or None; time of the test, for bonds that creep
+    reach : float, m; how far one step may move a variable
     """
 
     model: Model
@@ -37,12 +39,22 @@ class Stepper:
     patience: int = 25
     endurance: int = 40
     clock: Clock | None = None
+    reach: float = np.inf
     _preconditioner: SecantPreconditioner = field(default_factory=SecantPreconditioner, repr=False)
     _spent: int = field(default=0, repr=False)
 
     def on(self, model: Model) -> Stepper:
         """The same stepper for another model."""
         return Stepper(model, self.tolerance, self.limit, self.patience, self.endurance, self.clock)
+
+    def careful(self) -> Stepper:
+        """The same stepper with steps so short that none leaps over the strength of a bond.
+
+        A particle that hardly any bond holds may otherwise fly off in one step, through bonds that would hold it.
+        """
+        law = self.model.law
+        ends = law.delta_max[np.isfinite(law.f_max)]
+        return replace(self, reach=CAREFUL * float(ends.max(initial=0.0)) or np.inf, _spent=self.endurance)
 
     def duration(self, start: State, cmod: float) -> float:
         """How long (s) the test takes from an equilibrium to a CMOD; none to one that it had before."""
@@ -116,6 +128,7 @@ class Stepper:
             constraint,
             self.limit,
             self.patience,
+            self.reach,
         )
         self._spent += found.iterations
         return found, potential

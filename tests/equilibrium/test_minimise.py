@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.equilibrium.minimise import minimise
+from pipeline.materials.cohesive import LinearSoftening
 
 
 @dataclass
@@ -76,3 +77,18 @@ def test_running_out_of_iterations_is_said() -> None:
     assert not found.converged
     assert found.iterations == 3
     assert found.residual > 1e-12
+
+
+def test_short_steps_do_not_leap_over_what_would_hold() -> None:
+    """A pressed bond in a preconditioner that is far too soft: one full step breaks it, short ones find its rest."""
+    law = LinearSoftening(np.array([1.0]), np.array([1.0]), np.array([50.0]))
+    soft = Diagonal(np.array([1e-6]))
+
+    def force(q: np.ndarray) -> np.ndarray:
+        return law.force(q, np.zeros(1))
+
+    start = np.array([-0.5])
+    assert minimise(force, soft, start, 1e-6).at[0] > 50, "flew through its strength, and rests where nothing pulls"
+    held = minimise(force, soft, start, 1e-6, reach=0.25 * 50)
+    assert held.converged
+    assert held.at == pytest.approx([0.0], abs=1e-6)  # the tolerance over the stiffness
