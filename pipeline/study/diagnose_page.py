@@ -69,7 +69,8 @@ def verdict_section(result: Mapping[str, Any], remarks: Any) -> Section:
     told = [f"{result['verdict'].capitalize()}: {_meant(result)}.", f"{_sentence(result['reason'])}."]
     first = next((label for label in result["closure"] if set(label.split(" + ")) <= set(result["named"])), None)
     if first is not None:
-        told.append(f"{_sentence(closed(first, result['closure'][first]))}.")
+        held = "tests that it was not fitted to" if "transfer" in result else "data not used for it"
+        told.append(f"{_sentence(closed(first, result['closure'][first], held))}.")
     if result["named"] and result["separate_by"]:
         told.append(f"To check: {result['separate_by'][0].partition(': ')[2]}.")
     hidden = result["cannot_exclude"]
@@ -131,13 +132,13 @@ def _bare(key: str) -> str:
     return key.removesuffix("_n").removesuffix("_m").removesuffix("_j_per_m2")
 
 
-def closed(label: str, c: Mapping[str, Any]) -> str:
+def closed(label: str, c: Mapping[str, Any], held: str) -> str:
     """How far an explanation closes the gap, in words."""
     called = CALLED.get(label, label)
     if c["nothing_to_close"]:
         return f"{called}: nothing to close, the model as it is lies within what engines differ by"
     low, high = (percent(x) for x in c["interval_95"])
-    return f"{called} closes {percent(c['fraction'])} of the gap on data not used for it (95 %: {low} to {high})"
+    return f"{called} closes {percent(c['fraction'])} of the gap on {held} (95 %: {low} to {high})"
 
 
 def percent(share: float) -> str:

@@ -40,7 +40,9 @@ def result(**changed: Any) -> dict[str, Any]:
 def test_the_verdict_names_cause_size_closure_and_remedy():
     found = verdict_section(result(), ["a remark"])
     assert found.text.startswith("Cause: the load cell reads too much (load_gain). load_gain has probability 0.90.")
-    assert "closes 90% of the gap" in found.text
+    assert "closes 90% of the gap on data not used for it" in found.text
+    joint = verdict_section(result(transfer=[]), [])
+    assert "closes 90% of the gap on tests that it was not fitted to" in joint.text
     assert "To check: weigh it." in found.text
     assert "1 effect cannot be excluded" in found.text
     rows = {n.name: (n.value, n.remark) for n in found.numbers}
