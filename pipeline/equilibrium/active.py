@@ -8,8 +8,7 @@ from pipeline.core.problem import Kinematics, Problem
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.mixed_softening import MixedSoftening
 
-STRIP = 0.2  # half width of the strip over the ligament
-BEHIND = 0.02  # how far behind the tip it begins, over the ligament: what softens there lies beside the strip
+STRIP = 0.2  # half width of the strip over the ligament; also how far it begins behind the tip
 LARGEST = 0.5  # share of active bonds from which condensing does not pay
 FEWEST = 2000  # particles below which it does not pay either
 
@@ -17,9 +16,8 @@ FEWEST = 2000  # particles below which it does not pay either
 def strip(problem: Problem, share: float = STRIP) -> np.ndarray:
     """Bonds (m,) bool around the ligament, as far as `share` of it to either side."""
     middle = problem.particles.position[problem.bonds.pairs].mean(axis=1)
-    ligament = problem.specimen.ligament_length
-    begin = problem.specimen.tip[1] - BEHIND * ligament
-    return (np.abs(middle[:, 0]) <= share * ligament) & (middle[:, 1] >= begin)
+    half = share * problem.specimen.ligament_length
+    return (np.abs(middle[:, 0]) <= half) & (middle[:, 1] >= problem.specimen.tip[1] - half)
 
 
 def pays(problem: Problem, active: np.ndarray) -> bool:
