@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.core.errors import InputError, StoreError
+from pipeline.core.errors import ConvergenceError, InputError, StoreError
 from pipeline.gap.effects import library
 from pipeline.store.bundle import read_bundle
 from pipeline.study.blind_check import cases as drawing
@@ -274,6 +274,36 @@ def test_the_cases_of_a_full_check():
     assert sum(c.kind == "none" and bool(c.without) for c in found) > 0  # a short library betrays nothing
     assert sum(c.kind == "none" for c in found) >= 20
     assert sum(c.stranger is not None for c in found) >= 10
+
+
+def test_a_test_that_cannot_be_followed_is_broken_on_another_mesh(monkeypatch):
+    tried = []
+    monkeypatch.setattr(making, "setup_of", lambda sample, rng: tried.append(rng.integers(2**32)) or len(tried))
+
+    def follow(setup, cmod_max):
+        if setup < 3:
+            raise ConvergenceError("it snaps back")
+        return "path"
+
+    monkeypatch.setattr(making, "break_triangles", follow)
+    assert making.broken_on_some_mesh(None, [1, 7, 0], 1e-3) == (3, "path")
+    assert len(set(tried)) == 3  # every mesh is another
+    monkeypatch.setattr(making, "break_triangles", lambda *_: follow(0, 0))
+    with pytest.raises(ConvergenceError, match="snaps back"):
+        making.broken_on_some_mesh(None, [1, 7, 0], 1e-3)
+
+
+def test_a_check_goes_on_only_as_it_was_begun(tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(making, "draw", stop)
+    for _ in range(2):  # the same again gets as far
+        with pytest.raises(KeyboardInterrupt):
+            making.make(tmp_path / "check", seed=4)
+    with pytest.raises(InputError, match="begun with another"):
+        making.make(tmp_path / "check", seed=5)
+    assert not list((tmp_path / "check").rglob("begun.json"))  # the seed lies in the vault
 
 
 def test_the_small_check_has_twelve_cases():

@@ -17,7 +17,7 @@ from pipeline.blind.equilibrium import Setup
 from pipeline.blind.equilibrium import solve as break_triangles
 from pipeline.blind.record import MEASUREMENT, Camera, Recorder
 from pipeline.blind.sample import PHYSICS, Material, Sample, continuum, setup_of
-from pipeline.core.errors import InputError
+from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import GPA, MM
 from pipeline.dic.camera import View
@@ -25,6 +25,7 @@ from pipeline.dic.speckle import Camera as Lens
 from pipeline.dic.speckle import Speckle, photograph
 from pipeline.execution.progress import Progress, Silent
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
+from pipeline.store.atomic import write_atomically
 from pipeline.store.creep import CreepRecord
 from pipeline.store.experiment import Experiment
 from pipeline.store.new import Contents, write_bundle
@@ -35,10 +36,12 @@ from pipeline.study.photography import camera_frame, view_of
 from pipeline.study.virtual_test import CAMERA_MM_PER_PX, Request, prepare
 
 SPREAD = 0.12  # the truth lies within ± this share of the start
+MESHES = 4  # tried until one can be followed to the end
 STILL = 4  # frames of the unloaded specimen
 GRID, ROI = 1.6 * MM, 44 * MM  # of measured points
 PIXEL_NOISE = 2.0  # grey values
 BLUR = 0.6  # px
+BEGUN = "begun.json"  # in the vault
 CREEP_SHARE, CREEP_FLOW, CREEP_TIME = 0.3, 600.0, 12.0  # D₂/D₁, η₁ D₁ in s, τ₂ in s
 CREEP_AT = np.geomspace(0.1, 300.0, 40)  # s
 
@@ -87,7 +90,7 @@ def make(
     Raises
     ------
     InputError
-        where OUT is sealed already
+        where OUT is sealed already, or was begun with another size, seed or limits
     """
     out, progress = Path(out).resolve(), progress or Silent()
     vault, chosen = vault_of(out), SIZES[size]
@@ -97,6 +100,7 @@ def make(
         prepare_output(folder)
     of_cases, of_specimens, of_tests = (np.random.default_rng([seed, k]) for k in range(3))
     known = limits_of(limits)
+    _begun(vault, {"size": size, "seed": seed, "limits": known, "version": __version__})
     cases = drawn_cases(size, known, of_cases)
     streams = of_tests.spawn(len(cases))
     progress.stage(f"breaking {len(cases)} tests")
@@ -126,6 +130,18 @@ def make(
     made = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     write_seal(out, truth, vault, {"size": size, "made": made})
     return f"{len(cases)} sealed tests; their truth lies locked in {vault.name}"
+
+
+def _begun(vault: Path, asked: dict[str, Any]) -> None:
+    """Write down what is made; refuse to go on with something else."""
+    file = vault / BEGUN
+    if not file.exists():
+        write_atomically(file, canonical(asked))
+    elif file.read_bytes() != canonical(asked):
+        raise InputError(
+            f"{vault.with_suffix('').name} was begun with another size, seed, limits or version: go on with these, or "
+            "choose another folder"
+        )
 
 
 def draw(geometry: str, size: Size, rng: np.random.Generator) -> Drawn:
@@ -165,9 +181,26 @@ def crack(case: Case, drawn: Drawn, size: Size, seed: int) -> tuple[Setup, Broke
         edge=size.edge_mm * MM,
         cmod_rate=drawn.experiment.loading.cmod_rate,
     )
-    setup = setup_of(sample, np.random.default_rng([seed, 7, case.specimen]))
     assert drawn.experiment.loading.cmod_max is not None
-    return setup, break_triangles(setup, 1.002 * drawn.experiment.loading.cmod_max)
+    return broken_on_some_mesh(sample, [seed, 7, case.specimen], 1.002 * drawn.experiment.loading.cmod_max)
+
+
+def broken_on_some_mesh(sample: Sample, seed: list[int], cmod_max: float) -> tuple[Setup, Broken]:
+    """The sample broken on the first of a few meshes on which it can be followed.
+
+    Raises
+    ------
+    ConvergenceError
+        where none can: the last one's reason
+    """
+    for attempt in range(MESHES):
+        setup = setup_of(sample, np.random.default_rng([*seed, attempt] if attempt else seed))
+        try:
+            return setup, break_triangles(setup, cmod_max)
+        except ConvergenceError:
+            if attempt == MESHES - 1:
+                raise
+    raise AssertionError("unreachable: the last mesh returns or raises")
 
 
 def material_of(drawn: Drawn) -> Material:
