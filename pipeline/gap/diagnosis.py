@@ -31,6 +31,11 @@ FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, f
 MOVES = 3  # how often the grid follows the best of the explanations that need no simulation
 BESIDE = (0.002, -0.002)  # of f_max: where a node is tried again at which no equilibrium is found
 NUDGES = ((0.003, 0.0), (0.0, 0.003), (-0.003, -0.003))  # of the parameters, relative: what may not matter
+PLACEMENTS = (
+    (0.5, 0.0),
+    (0.25, 0.25),
+    (0.75, 0.25),
+)  # of a lattice, in its periods; with none: even
 LIKELY = 0.05  # probability from which a physics effect is simulated again at its best point
 CONFIRMED = 3  # at most so many
 CLOSED = 3  # best explanations whose closure is looked at
@@ -38,11 +43,12 @@ CLOSED = 3  # best explanations whose closure is looked at
 
 @dataclass(frozen=True)
 class Run:
-    """One simulation that is asked for: parameters (N, m) and physics effects by name."""
+    """One simulation that is asked for: parameters (N, m), physics effects by name, place of the lattice (periods)."""
 
     f_max: float
     delta_max: float
     effects: tuple[tuple[str, float], ...] = ()
+    placement: tuple[float, float] = (0.0, 0.0)
 
 
 Outcome = Response | str
@@ -138,6 +144,8 @@ def diagnose(
     wanted = sorted(library() if names is None else names)
     emulator, near = baseline(observation, abscissae, counted, Design(start, factors, factors), entry, wanted)
     entry = fitted_to(entry, observation, emulator, near)
+    if entry.discrepancy.placements > 0:
+        emulator = with_placements(emulator, counted, emulator.rounded(near.parameters))
     emulator, untested = with_signatures(emulator, counted, emulator.rounded(near.parameters), wanted)
     known = [n for n in wanted if n not in untested]
     look = _Look(*weighed(observation, emulator, entry), known, entry.temperature)
@@ -254,11 +262,28 @@ def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple
     mask = part.mask
     some = np.ix_(mask, mask)
     modes = entry.discrepancy.of_modes(part.sight, part.load_scale)[some]
+    modes += entry.discrepancy.placements * elsewhere(emulator, mask)
     local = np.diag(part.noise)
     cut = part.reading.field.size
     local[:cut, :cut] += entry.discrepancy.local(part.sight)
     metric = Metric(modes + local[some] + scatter(emulator, mask), modes, entry.discrepancy.tail)
     return part, Data(part.reading.flat()[mask], metric, emulator.box)
+
+
+def elsewhere(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
+    """Mean product (n, n) of what other places of the lattice change: which bonds a stone holds is an accident."""
+    changes = emulator.elsewhere(mask)
+    return changes.T @ changes / max(len(changes), 1)
+
+
+def with_placements(emulator: Emulator, simulate: Simulate, parameters: np.ndarray) -> Emulator:
+    """With what the model says when its lattice lies elsewhere on the specimen; places that fail are left out."""
+    at = (float(parameters[0]), float(parameters[1]))
+    here, *others = simulate([Run(*at), *(Run(*at, placement=p) for p in PLACEMENTS)])
+    if isinstance(here, str):
+        raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {here}")
+    changes = [o.flat() - here.flat() for o in others if not isinstance(o, str)]
+    return replace(emulator, placed=tuple(changes))
 
 
 def fitted_to(entry: Entry, observation: Observation, emulator: Emulator, best: Fitted) -> Entry:

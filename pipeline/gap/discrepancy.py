@@ -42,6 +42,7 @@ class Discrepancy:
     waves : (n, k, knots) array; what specimens were left with, m, and 1 for the load
     empirical : float, 0 to 1; share of the waves in the covariance
     tail : float; degrees of freedom of the modes' scale, inf: it is known
+    placements : float; how much the covariance counts of what other places of the lattice change, 0: not at all
     """
 
     amplitude: np.ndarray
@@ -54,6 +55,7 @@ class Discrepancy:
     waves: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ALL), KNOTS.size)))
     empirical: float = 0.0
     tail: float = np.inf
+    placements: float = 0.0
 
     def __post_init__(self) -> None:
         k = len(ALL)
@@ -77,6 +79,7 @@ class Discrepancy:
             waves=modes * self.waves,
             remainder=local * self.remainder,
             white=local * self.white,
+            placements=modes**2 * self.placements,
         )
 
     def covariance(self, sight: Sight, load_scale: float) -> np.ndarray:

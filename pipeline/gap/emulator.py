@@ -13,7 +13,7 @@ from pipeline.gap.candidate import Candidate
 from pipeline.gap.effect import MeasurementEffect
 from pipeline.gap.effects import effect
 from pipeline.gap.observation import Reading, Sight
-from pipeline.gap.response import Abscissae, Response, continued, split
+from pipeline.gap.response import Abscissae, Response, continued, read, split
 from pipeline.inverse.surrogate import LagrangeSurrogate
 
 MARGIN = 0.1  # of the grid's width, by which parameters may leave it
@@ -58,6 +58,7 @@ class Emulator:
     signatures : effect → Signature, physics effects only
     offset : (n,) array; added to everything, so that a confirmed point is met exactly
     again : (parameters (2,), `Response.flat` (n,)) of simulations beside a confirmed point, which the function is not
+    placed : (n,) arrays; changes of `Response.flat` when the lattice lies elsewhere on the specimen
         drawn through: what they differ by from it is scatter
     """
 
@@ -69,6 +70,7 @@ class Emulator:
     signatures: Mapping[str, Signature] = field(default_factory=dict)
     offset: np.ndarray | float = 0.0
     again: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    placed: tuple[np.ndarray, ...] = ()
 
     @cached_property
     def _known(self) -> np.ndarray:
@@ -188,6 +190,12 @@ class Emulator:
     def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
         """Moved by what a simulation without effects at these parameters, `Response.flat` (n,), says otherwise."""
         return replace(self, offset=self.offset + simulated - self.response(parameters, {}).flat())
+
+    def elsewhere(self, mask: np.ndarray) -> np.ndarray:
+        """What other places of the lattice change of the data; (places, n)."""
+        points, cmod = len(self.sight.points), self.sight.cmod
+        rows = [read(split(p, self.abscissae, points), self.abscissae, cmod, cmod).flat()[mask] for p in self.placed]
+        return np.nan_to_num(np.reshape(rows, (len(rows), int(mask.sum()))))
 
     def jitter(self, mask: np.ndarray) -> np.ndarray:
         """What the simulations beside a confirmed point differ by from the function; (j, n) of the data."""

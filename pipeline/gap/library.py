@@ -148,6 +148,7 @@ def _entry(raw: Mapping[str, Any]) -> Entry:
         np.array(raw["waves_um"]) * SIZES[:, None],
         raw["empirical"],
         raw["tail"] or np.inf,
+        raw["placements"],
     )
     return Entry(
         domain,
@@ -188,6 +189,7 @@ def _raw(entry: Entry) -> dict[str, Any]:
         "seeds": list(entry.seeds),
         "empirical": x.empirical,
         "tail": x.tail if np.isfinite(x.tail) else None,
+        "placements": round(x.placements, 4),
         "freedom": round(entry.freedom, 3),
         "parameters": {name: [round(v, 4) for v in both] for name, both in entry.parameters.items()},
         "temperature": round(entry.temperature, 4),

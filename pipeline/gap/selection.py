@@ -17,7 +17,8 @@ from pipeline.gap.learning import Remnant, learn, local_factor
 FACTORS = np.geomspace(0.02, 50.0, 31)  # of the variance of all modes, that are tried
 SCALES = np.geomspace(0.1, 3.0, 30)  # of the same, for all specimens
 TAILS = np.array([1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0])  # degrees of freedom
-SHARES = (0.2, 0.4, 0.6, 0.8, 0.9)  # of the specimens' own waves in the covariance, that are tried
+SHARES = (0.4, 0.7)  # of the specimens' own waves in the covariance, that are tried
+PLACED = (0.0, 0.5, 1.0, 2.0)  # of what other places of the lattice change, that are tried
 QUIET = 1.5  # Σ over noise, below which a direction says what scatter there is beside the waves
 
 
@@ -30,11 +31,13 @@ class Rest:
     remnant : Remnant
     slopes : (n, q) array; derivatives of the prediction by the parameters, in any unit
     scatter : (n, n) array; covariance of the simulations' own scatter
+    elsewhere : (n, n) array; mean product of what other places of the lattice change, or 0
     """
 
     remnant: Remnant
     slopes: np.ndarray
     scatter: np.ndarray
+    elsewhere: np.ndarray | float = 0.0
 
     @property
     def values(self) -> np.ndarray:
@@ -48,7 +51,8 @@ class Rest:
         some = np.ix_(o.mask, o.mask)
         local, cut = np.diag(o.noise), o.reading.field.size
         local[:cut, :cut] += discrepancy.local(o.sight)
-        return local[some] + self.scatter, discrepancy.of_modes(o.sight, self.remnant.load_scale)[some]
+        modes = discrepancy.of_modes(o.sight, self.remnant.load_scale)[some]
+        return local[some] + self.scatter, modes + discrepancy.placements * self.elsewhere
 
 
 @dataclass(frozen=True)
@@ -108,17 +112,17 @@ class Selected:
     log_density: float
 
 
-def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES) -> Selected:
+def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Sequence[float] = PLACED) -> Selected:
     """The discrepancy of all, with the share of their own waves and the scales that are likeliest for those left out.
 
     Parameters
     ----------
     rests : Rest of every specimen, at least four
-    shares : that are tried
+    shares, placed : that are tried
     """
-    tried = [(share, left_out(rests, share)) for share in shares]
-    found = [(scale_of([o.densities for o in left]), share, left) for share, left in tried]
-    scale, share, left = max(found, key=lambda one: one[0].log_density)
+    tried = [(share, place, left_out(rests, share, place)) for share in shares for place in placed]
+    found = [(scale_of([o.densities for o in left]), share, place, left) for share, place, left in tried]
+    scale, share, place, left = max(found, key=lambda one: one[0].log_density)
     local = float(np.exp(np.mean([np.log(o.local) for o in left])))
     gates = [o.gate(scale.typical) for o in left]
     check: dict[str, list[float]] = {}
@@ -126,27 +130,27 @@ def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES) -> Selecte
         for mode, ratio in one.gate(one.own(scale)).ratio.items():
             check.setdefault(mode, []).append(ratio)
     return Selected(
-        replace(learnt(rests, share).scaled(np.sqrt(scale.typical), local), tail=scale.tail),
+        replace(learnt(rests, share, place).scaled(np.sqrt(scale.typical), local), tail=scale.tail),
         freedom_of([(g.ratio[m], g.freedom[m]) for g in gates for m in g.ratio]),
         {mode: float(np.mean(values)) for mode, values in check.items()},
         scale.log_density,
     )
 
 
-def learnt(rests: Sequence[Rest], share: float) -> Discrepancy:
+def learnt(rests: Sequence[Rest], share: float, place: float = 0.0) -> Discrepancy:
     """The discrepancy with the scatter that no wave explains; of typical scale for the mean of squares."""
-    found = learn([r.remnant for r in rests], share)
+    found = replace(learn([r.remnant for r in rests], share), placements=place)
     square, expected, noise = np.sum([_heard(r, found) for r in rests], axis=0).T
     excess = square / np.maximum(expected, 1e-9) - 1
     return replace(found, white=np.sqrt(np.maximum(excess, 0.0) * noise / len(rests)))
 
 
-def left_out(rests: Sequence[Rest], share: float) -> list[LeftOut]:
+def left_out(rests: Sequence[Rest], share: float, place: float = 0.0) -> list[LeftOut]:
     """Every specimen beside what the others say."""
-    found, white = [], learnt(rests, share).white
+    found, white = [], learnt(rests, share, place).white
     for k, rest in enumerate(rests):
         others = [r.remnant for i, r in enumerate(rests) if i != k]
-        model = replace(learn(others, share), white=white)
+        model = replace(learn(others, share), white=white, placements=place)
         factor = local_factor(rest.remnant.observation, model)
         fixed, modes = rest.beside(model.scaled(1.0, factor))
         found.append(LeftOut(rest, fixed, modes, restricted(rest.values, rest.slopes, fixed, modes), factor))

@@ -67,6 +67,8 @@ class Simulator:
 
     def problem(self, run: Run) -> Problem:
         """The test of one run."""
+        if run.placement != (0.0, 0.0):
+            return self._elsewhere(run)
         a = self.abscissae
         end = max(a.field[-1], a.load[-1]) * (1 + 1e-6)
         problem = self.model.problem(run.f_max, run.delta_max, frames=a.field, cmod_max=end, accuracy=self.accuracy)
@@ -74,6 +76,13 @@ class Simulator:
             plan = planned(self.model.bundle.specimen, self.model.mixture, dict(run.effects))
             problem = lattice_problem(self.model, plan, problem, run.f_max, run.delta_max)
         return problem if self.band is None else held_to(problem, self.band)
+
+    def _elsewhere(self, run: Run) -> Problem:
+        """The same test with the lattice moved by shares of its periods along and across the rows."""
+        period = self.model.particles.radius * np.array([2.0, 2 * np.sqrt(3.0)])
+        along, across = run.placement * period
+        moved = replace(self, model=self.model.placed((float(along), float(across))))
+        return moved.problem(replace(run, placement=(0.0, 0.0)))
 
     def __call__(self, runs: Sequence[Run]) -> list[Outcome]:
         """What every run shows, or why there is none."""

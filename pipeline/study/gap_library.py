@@ -16,7 +16,7 @@ from pipeline.core.errors import ConvergenceError
 from pipeline.core.units import MM
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.diagnosis import baseline, scatter, weighed
+from pipeline.gap.diagnosis import baseline, elsewhere, scatter, weighed, with_placements
 from pipeline.gap.discrepancy import ALL, KNOTS, Discrepancy
 from pipeline.gap.emulator import Emulator
 from pipeline.gap.fit import fit
@@ -146,7 +146,9 @@ def one_specimen(
     band = band_of(look, simulator, start)
     observation = beside(look.observation, band.path)
     design = Design(start, FACTORS, FACTORS)
-    emulator, _ = baseline(observation, look.abscissae, replace(simulator, band=band), design, entry)
+    simulator = replace(simulator, band=band)
+    emulator, best = baseline(observation, look.abscissae, simulator, design, entry)
+    emulator = with_placements(emulator, simulator, emulator.rounded(best.parameters))
     return Specimen(folder.name, observation, emulator, (truth["f_max_n"], truth["delta_max_m"]))
 
 
@@ -158,7 +160,9 @@ def rest_of(specimen: Specimen, entry: Entry) -> tuple[Rest, np.ndarray]:
     left = observation.reading - specimen.emulator.reading(found.parameters)
     remnant = Remnant(replace(observation, reading=left), observation.load_scale)
     slopes = np.column_stack([_slope(candidate, found.parameters, step) for step in np.diag(STEP * data.width)])
-    return Rest(remnant, slopes, scatter(specimen.emulator, observation.mask)), found.parameters
+    mask = observation.mask
+    rest = Rest(remnant, slopes, scatter(specimen.emulator, mask), elsewhere(specimen.emulator, mask))
+    return rest, found.parameters
 
 
 def _slope(candidate: Candidate, at: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.diagnosis import diagnose, scatter, weighed
+from pipeline.gap.diagnosis import baseline, diagnose, scatter, weighed, with_placements
 from pipeline.gap.effects import library
 from pipeline.gap.identifiability import card
 from pipeline.gap.observation import Observation, Reading
+from pipeline.inverse.design import Design
 from tests.gap.scene import ABSCISSAE, PHYSICS, START, entry, measured, simulate
 
 FEW = (0.8, 1.0, 1.2)
@@ -145,3 +146,19 @@ def test_an_effect_outside_the_library_is_not_pinned_on_another():
     d = found(measured(["magnification"], [0.003], np.random.default_rng(8)), names)
     assert d.verdict.kind != "none needed"
     assert d.verdict.kind != "cause" or d.verdict.named == ("lens_distortion",)
+
+
+def test_what_other_places_of_the_lattice_change_widens_the_metric():
+    """A load that is 60 N higher on every other place of the lattice counts with the weight that the entry gives it."""
+
+    def placed(runs):
+        moved = [60.0 * (run.placement != (0.0, 0.0)) for run in runs]
+        return [replace(o, load=o.load + m) for m, o in zip(moved, simulate(runs), strict=True)]
+
+    test, plain_entry = measured(rng=np.random.default_rng(2)), entry()
+    start, grid = np.array(START), Design(START, FEW, FEW)
+    emulator, _ = baseline(test, ABSCISSAE, placed, grid, plain_entry)
+    emulator = with_placements(emulator, placed, start)
+    counting = replace(plain_entry, discrepancy=replace(plain_entry.discrepancy, placements=0.5))
+    before, after = (np.diag(weighed(test, emulator, e)[1].metric.covariance)[-13:] for e in (plain_entry, counting))
+    assert np.allclose(after - before, 0.5 * 60.0**2)
