@@ -139,13 +139,43 @@ class Emulator:
         field_at = load_at = self.sight.cmod
         for one, value in measuring:
             field_at, load_at = one.field_at(value, self.sight, field_at), one.load_at(value, self.sight, load_at)
-        simulated, same = self.response(parameters, physics), field_at is self.sight.cmod
-        weights = self._usual if same else self.abscissae.frames_to(field_at)
-        field = (weights @ simulated.field.reshape(len(simulated.field), -1)).reshape(-1, *simulated.field.shape[1:])
-        found = Reading(field, self.abscissae.loads_to(simulated.load, load_at))
+        if field_at is self.sight.cmod and load_at is self.sight.cmod:
+            found = self._at_stations(parameters, physics)
+        else:
+            simulated = self.response(parameters, physics)
+            weights = self.abscissae.frames_to(field_at)
+            rows = weights @ simulated.field.reshape(len(simulated.field), -1)
+            field = rows.reshape(-1, *simulated.field.shape[1:])
+            found = Reading(field, self.abscissae.loads_to(simulated.load, load_at))
         for one, value in measuring:
             found = one.distort(value, self.sight, found)
         return found
+
+    @cached_property
+    def _read(self) -> tuple[LagrangeSurrogate, Mapping[str, Signature], np.ndarray]:
+        """Grid, signatures and offset at the usual stations: all that is read there is linear in what is simulated."""
+        signatures, offset = self._smooth
+        values = self._surrogate.values
+        grid = self._at_usual(values.reshape(-1, values.shape[-1])).reshape(*values.shape[:2], -1)
+        there = {n: replace(s, changes=self._at_usual(s.changes)) for n, s in signatures.items()}
+        return LagrangeSurrogate(self.f_max, self.delta_max, grid), there, self._at_usual(offset[None])[0]
+
+    def _at_usual(self, rows: np.ndarray) -> np.ndarray:
+        """Numbers (j, n) of whole responses as `Reading.flat` (j, 2sp + s) at the usual stations."""
+        look, points, found = self.abscissae, len(self.sight.points), []
+        for row in rows:
+            one = split(row, look, points)
+            field = self._usual @ one.field.reshape(len(one.field), -1)
+            found.append(np.concatenate([field.ravel(), look.loads_to(one.load, self.sight.cmod)]))
+        return np.array(found)
+
+    def _at_stations(self, parameters: np.ndarray, physics: Mapping[str, float]) -> Reading:
+        grid, signatures, offset = self._read
+        flat = grid.value(parameters) + offset
+        for name, value in physics.items():
+            flat += signatures[name].at(value)
+        s, p = self.sight.cmod.size, len(self.sight.points)
+        return Reading(flat[: 2 * s * p].reshape(s, p, 2), flat[2 * s * p :])
 
     def _sorted(
         self, names: Sequence[str], amplitudes: np.ndarray
