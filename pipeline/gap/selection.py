@@ -14,11 +14,11 @@ from pipeline.gap.discrepancy import Discrepancy
 from pipeline.gap.gate import Gate, gate
 from pipeline.gap.learning import Remnant, learn, local_factor
 
-FACTORS = np.geomspace(0.02, 50.0, 31)  # of the variance of all modes, that are tried
+FACTORS = np.geomspace(0.02, 50.0, 23)  # of the variance of all modes, that are tried
 SCALES = np.geomspace(0.1, 3.0, 30)  # of the same, for all specimens
 TAILS = np.array([1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0])  # degrees of freedom
 SHARES = (0.4, 0.7)  # of the specimens' own waves in the covariance, that are tried
-PLACED = (0.0, 0.5, 1.0, 2.0)  # of what other places of the lattice change, that are tried
+PLACED = (0.0, 0.5, 1.0)  # of what other places of the lattice change, that are tried
 QUIET = 1.5  # Σ over noise, below which a direction says what scatter there is beside the waves
 
 
