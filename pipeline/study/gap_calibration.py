@@ -103,7 +103,7 @@ def drawn(limits: Mapping[str, float | None], count: int, rng: np.random.Generat
     """Effects and sizes by chance, from detection limits (None: there is none; then up to the plausible maximum)."""
     names = sorted(limits)
     chosen = rng.choice(len(names), size=min(count, len(names)), replace=False)
-    factors = np.exp(rng.uniform(*np.log(SIZES), size=len(chosen)))
+    factors = SIZES[0] * (SIZES[1] / SIZES[0]) ** rng.uniform(size=len(chosen))
     signs = rng.choice([-1.0, 1.0], size=len(chosen))
     return [(names[i], sized(names[i], limits[names[i]], f, s)) for i, f, s in zip(chosen, factors, signs, strict=True)]
 
