@@ -18,7 +18,7 @@ from pipeline.study.blind_check import make as making
 from pipeline.study.blind_check.guard import Guard
 from pipeline.study.blind_check.opening import open_check
 from pipeline.study.blind_check.run import replicates, run
-from pipeline.study.blind_check.score import calibration, design_effect, paired, scores, wilson
+from pipeline.study.blind_check.score import calibration, closure_ratio, design_effect, paired, scores, wilson
 from pipeline.study.blind_check.seal import SEAL, VERDICTS, lock, salted, unlock, vault_of, write_seal
 
 FAKE = "study.fake_diagnosis:diagnose"
@@ -235,6 +235,16 @@ def test_scores_against_a_hand_count():
     assert [m["case"] for m in found["misses"]] == ["2", "5", "7"]
     # bins by hand: 0.9 → 1 of 2 right (0.9, 0.95), 0.6 → 0 of 1, 0.8 → 1 of 1, 0.7 → 1 of 1, 0.0 → 0 of 1
     assert found["ece"]["value"] == pytest.approx((2 * abs(0.925 - 0.5) + 0.6 + 0.2 + 0.3 + 0.0) / 6)
+
+
+def test_closure_is_compared_where_the_truth_closes_anything():
+    def ratio(said_there: float | None, true_there: float | None) -> float | None:
+        closed = {"creep": {"fraction": said_there}, "modulus": {"fraction": true_there}}
+        [case] = paired({"1": row("modulus")}, {"1": said("creep", closure=closed)})
+        return closure_ratio(case)
+
+    assert ratio(0.6, 0.8) == pytest.approx(0.75)
+    assert [ratio(0.6, None), ratio(None, 0.8), ratio(0.6, 0.0), ratio(0.6, -0.2)] == [None] * 4
 
 
 def test_calibration_of_what_is_always_right():

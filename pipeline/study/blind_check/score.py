@@ -195,10 +195,11 @@ def confusion(cases: Sequence[Scored]) -> dict[str, dict[str, int]]:
 
 
 def closure_ratio(case: Scored) -> float | None:
-    """Closure of what was chosen over that of the true effect; null where one was not computed."""
+    """Closure of what was chosen over that of the true effect; null where one was not computed, or the truth closes
+    nothing."""
     closure = {label_of(n.split(" + ")): row.get("fraction") for n, row in case.result.get("closure", {}).items()}
     chosen, oracle = closure.get(case.top), closure.get(case.truth)
-    return float(chosen / oracle) if chosen is not None and oracle else None
+    return float(chosen / oracle) if chosen is not None and oracle is not None and oracle > 0 else None
 
 
 def largest_drop(case: Scored) -> str:
