@@ -15,17 +15,14 @@ from pipeline.report.style import Draw, png
 from pipeline.store.atomic import write_atomically
 from pipeline.study.diagnose_arrays import whole_curve
 from pipeline.study.diagnose_case import Case
-from pipeline.study.diagnose_page import (
+from pipeline.study.diagnose_page import footer, load_std, unseen_section, where_figures
+from pipeline.study.diagnose_words import (
     CALLED,
     alike,
     closure_row,
-    footer,
     likely,
-    load_std,
     next_section,
-    unseen_section,
     verdict_section,
-    where_figures,
     where_told,
 )
 from pipeline.study.pages import picture, write_page

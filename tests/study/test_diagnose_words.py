@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.study.diagnose_page import amount, closure_row, likely, next_section, percent, verdict_section, where_told
+from pipeline.study.diagnose_words import (
+    amount,
+    closure_row,
+    likely,
+    next_section,
+    percent,
+    verdict_section,
+    where_told,
+)
 
 
 def share(fraction: float | None) -> dict[str, Any]:
