@@ -15,17 +15,15 @@ from pipeline.gap.emulator import Emulator, Signature
 from pipeline.gap.fit import Data, Fitted, fit
 from pipeline.gap.gate import Gate, gate
 from pipeline.gap.identifiability import Card, card
-from pipeline.gap.learning import local_factor
 from pipeline.gap.library import Entry
-from pipeline.gap.metric import Metric
 from pipeline.gap.noise import noise_bic
 from pipeline.gap.observation import Observation
 from pipeline.gap.response import Abscissae, Response
 from pipeline.gap.score import NONE, Scored, pairs, score
 from pipeline.gap.verdict import Verdict, verdict
+from pipeline.gap.weighing import fitted_to, weighed
 from pipeline.gap.where import Cell, where
 from pipeline.inverse.design import Design
-from pipeline.inverse.surrogate import LagrangeSurrogate, node_covariance
 
 FACTORS = (0.7, 0.85, 1.0, 1.15, 1.3)  # of the start: wider than a fit needs, for effects pull parameters away
 MOVES = 3  # how often the grid follows the best of the explanations that need no simulation
@@ -256,26 +254,6 @@ def _nodes(simulate: Simulate, runs: list[Run]) -> list[Response]:
     return [o for o in outcomes if not isinstance(o, str)]
 
 
-def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple[Observation, Data]:
-    """The data that all simulations have, with Σ = noise + discrepancy + scatter of the simulations themselves."""
-    part = observation.only(observation.mask & emulator.available())
-    mask = part.mask
-    some = np.ix_(mask, mask)
-    modes = entry.discrepancy.of_modes(part.sight, part.load_scale)[some]
-    modes += entry.discrepancy.placements * elsewhere(emulator, mask)
-    local = np.diag(part.noise)
-    cut = part.reading.field.size
-    local[:cut, :cut] += entry.discrepancy.local(part.sight)
-    metric = Metric(modes + local[some] + scatter(emulator, mask), modes, entry.discrepancy.tail)
-    return part, Data(part.reading.flat()[mask], metric, emulator.box)
-
-
-def elsewhere(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
-    """Mean product (n, n) of what other places of the lattice change: which bonds a stone holds is an accident."""
-    changes = emulator.elsewhere(mask)
-    return changes.T @ changes / max(len(changes), 1)
-
-
 def with_placements(emulator: Emulator, simulate: Simulate, parameters: np.ndarray) -> Emulator:
     """With what the model says when its lattice lies elsewhere on the specimen; places that fail are left out."""
     at = (float(parameters[0]), float(parameters[1]))
@@ -284,30 +262,6 @@ def with_placements(emulator: Emulator, simulate: Simulate, parameters: np.ndarr
         raise ConvergenceError(f"the baseline of the diagnosis cannot be simulated: {here}")
     changes = [o.flat() - here.flat() for o in others if not isinstance(o, str)]
     return replace(emulator, placed=tuple(changes))
-
-
-def fitted_to(entry: Entry, observation: Observation, emulator: Emulator, best: Fitted) -> Entry:
-    """The entry with local scatter as large as this very test shows it beside its best explanation."""
-    part = observation.only(observation.mask & emulator.available())
-    reading = emulator.reading(best.parameters, best.candidate.names, best.amplitudes)
-    factor = local_factor(replace(part, reading=part.reading - reading), entry.discrepancy)
-    return replace(entry, discrepancy=entry.discrepancy.scaled(1.0, factor))
-
-
-def scatter(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
-    """Covariance (n, n) of what changes from simulation to simulation without order (crack paths that jump).
-
-    From node to node of the grid what no smooth function of the parameters has; and what nudges of the parameters
-    change beside the point that all effects are simulated at.
-    """
-    nodes = [np.array([f, d]) for f in emulator.f_max for d in emulator.delta_max]
-    seen = np.reshape(
-        [emulator.reading(node).flat()[mask] for node in nodes],
-        (emulator.f_max.size, emulator.delta_max.size, -1),
-    )
-    nodes_differ = node_covariance(LagrangeSurrogate(emulator.f_max, emulator.delta_max, seen))[0]
-    jitter = emulator.jitter(mask)
-    return nodes_differ + jitter.T @ jitter / max(len(jitter), 1)
 
 
 def with_signatures(

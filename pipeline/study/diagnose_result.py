@@ -10,13 +10,14 @@ import numpy as np
 from pipeline import __version__
 from pipeline.core.units import MM, UM
 from pipeline.gap.closure import Closure, Distance, Share
-from pipeline.gap.diagnosis import Diagnosis, scatter
+from pipeline.gap.diagnosis import Diagnosis
 from pipeline.gap.effects import effect, library
 from pipeline.gap.fit import Fitted
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import DETECTED, Card
 from pipeline.gap.score import NONE, Scored
 from pipeline.gap.verdict import CAUSE, Verdict
+from pipeline.gap.weighing import scatter
 from pipeline.store.bundle import Bundle
 from pipeline.study.diagnose_sight import Seen
 

@@ -16,7 +16,7 @@ from pipeline.core.errors import ConvergenceError
 from pipeline.core.units import MM
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.diagnosis import baseline, elsewhere, scatter, weighed, with_placements
+from pipeline.gap.diagnosis import baseline, with_placements
 from pipeline.gap.discrepancy import ALL, KNOTS, Discrepancy
 from pipeline.gap.emulator import Emulator
 from pipeline.gap.fit import fit
@@ -24,6 +24,7 @@ from pipeline.gap.learning import Remnant, learn
 from pipeline.gap.library import Domain, Entry, parse, written
 from pipeline.gap.observation import Observation
 from pipeline.gap.selection import Rest, selected
+from pipeline.gap.weighing import elsewhere, scatter, weighed
 from pipeline.inverse.design import Design
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import read_bundle

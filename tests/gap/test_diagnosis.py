@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.diagnosis import baseline, diagnose, scatter, weighed, with_placements
+from pipeline.gap.diagnosis import baseline, diagnose, with_placements
 from pipeline.gap.effects import library
 from pipeline.gap.identifiability import card
 from pipeline.gap.observation import Observation, Reading
+from pipeline.gap.weighing import scatter, weighed
 from pipeline.inverse.design import Design
 from tests.gap.scene import ABSCISSAE, PHYSICS, START, entry, measured, simulate
 
