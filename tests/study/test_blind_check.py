@@ -336,7 +336,7 @@ def test_detection_limits_of_a_diagnosis_scale_the_effects(tmp_path):
 @pytest.mark.slow
 def test_engine_cs_tests_are_ordinary_bundles(tmp_path, monkeypatch):
     """Made coarse: two cases, one of images, sealed; the truth opens again and fits its seal."""
-    coarse = drawing.Size(2.0, 5.0, ("seb",), 6, 0.2, {"seb": 0.12, "dct": 0.12})
+    coarse = drawing.Size(2.0, 5.0, ("seb",), 6, 6, 0.2, {"seb": 0.12, "dct": 0.12})
     monkeypatch.setitem(drawing.SIZES, "small", coarse)
     monkeypatch.setattr(making, "SIZES", drawing.SIZES)
     cases = [

@@ -63,7 +63,8 @@ class Size:
     radius_mm : float; of the diagnosing lattice
     edge_mm : float; of the triangles
     specimens : geometry of each specimen
-    frames : int
+    frames : int; fields under load, so close that nothing is lost between two of them at the peak
+    pictures : int; the same where they are speckle images, which cost more
     camera_mm_per_px : float; of speckle images
     cmod_max_mm : float
     """
@@ -72,13 +73,16 @@ class Size:
     edge_mm: float
     specimens: tuple[str, ...]
     frames: int
+    pictures: int
     camera_mm_per_px: float
     cmod_max_mm: Mapping[str, float] = field(default_factory=lambda: {"seb": 0.55, "dct": 0.6})
 
 
 SIZES = {
-    "small": Size(1.5, 2.0, ("seb", "seb"), 25, 0.09),
-    "full": Size(1.0, 1.5, ("seb",) * 6, 61, 0.0439),  # geometry and radius of the library of discrepancies that ships
+    "small": Size(1.5, 2.0, ("seb", "seb"), 121, 41, 0.09),
+    "full": Size(
+        1.0, 1.5, ("seb",) * 6, 121, 61, 0.0439
+    ),  # geometry and radius of the library of discrepancies that ships
 }
 # small: what each of the twelve cases is, in the order of the library's kinds
 SMALL = (

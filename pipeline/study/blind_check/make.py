@@ -254,9 +254,10 @@ def write_case(
     corners = view.point(np.array([(0, 0), (shape[1] - 1, shape[0] - 1)], float)) if case.images else points
     low, high = corners.min(axis=0), corners.max(axis=0)
     rate = drawn.experiment.loading.cmod_rate
-    step = float(path.cmod[-1]) / rate / size.frames
+    frames = size.pictures if case.images else size.frames
+    step = float(path.cmod[-1]) / rate / frames
     camera = Camera(
-        time=step * np.arange(STILL + size.frames),
+        time=step * np.arange(STILL + frames),
         points=points,
         centre=(low + high) / 2,
         corner=float(np.hypot(*(high - low)) / 2),
