@@ -70,7 +70,7 @@ def test_local_scatter_is_measured_beside_the_modes():
 @pytest.mark.slow
 def test_an_entry_learnt_from_eight_fits_those_left_out():
     rng, model = np.random.default_rng(3), discrepancy()
-    found = selected([rest(model, rng, np.sqrt(6 / rng.chisquare(6))) for _ in range(8)], shares=(0.4,))
+    found = selected([rest(model, rng, np.sqrt(6 / rng.chisquare(6))) for _ in range(8)], shares=(0.4,), placed=(0.0,))
     assert all(0.5 < value < 2 for value in found.check.values())
     size = found.discrepancy.amplitude / model.amplitude
     assert np.median(size) == pytest.approx(1.0, rel=0.5)  # eight specimens of unequal scale
