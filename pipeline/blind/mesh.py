@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from pipeline.core.errors import PipelineError
+from pipeline.core.errors import ConvergenceError
 from pipeline.core.specimen import Specimen
 
 COARSEST, GROWTH = 2.0, 0.25  # largest edge over the finest; growth of the edge per distance from the zone
@@ -269,6 +269,6 @@ def _check_slit(mesh: Mesh, slit: np.ndarray) -> None:
     wanted = [tuple(sorted(pair)) for pair in zip(slit[:-1].tolist(), slit[1:].tolist(), strict=True)]
     missing = [pair for pair in wanted if pair not in there]
     if missing:
-        raise PipelineError(
+        raise ConvergenceError(
             f"{len(missing)} of {len(wanted)} pieces of the notch are no edges of the mesh: finer edges"
         )

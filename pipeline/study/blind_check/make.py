@@ -194,8 +194,8 @@ def broken_on_some_mesh(sample: Sample, seed: list[int], cmod_max: float) -> tup
         where none can: the last one's reason
     """
     for attempt in range(MESHES):
-        setup = setup_of(sample, np.random.default_rng([*seed, attempt] if attempt else seed))
         try:
+            setup = setup_of(sample, np.random.default_rng([*seed, attempt] if attempt else seed))
             return setup, break_triangles(setup, cmod_max)
         except ConvergenceError:
             if attempt == MESHES - 1:
