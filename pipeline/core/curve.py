@@ -8,6 +8,8 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 
+ROUND_OFF = 1e-8  # of the last CMOD: an engine that is asked to end there may stop so much before it
+
 
 @dataclass(frozen=True)
 class LoadCurve:
@@ -90,7 +92,9 @@ def _around(mask: np.ndarray, index: int) -> slice:
 
 
 def _at_first_passage(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Interpolate y where the running maximum of x first reaches each value of `at`."""
+    """Interpolate y where the running maximum of x first reaches each value of `at`; its end is known to round-off."""
     reached = np.maximum.accumulate(x)
     rising = np.concatenate([[True], np.diff(reached) > 0])
+    end = reached[-1]
+    at = np.where((at > end) & (at <= end + ROUND_OFF * abs(end)), end, at)
     return np.interp(at, reached[rising], y[rising], left=np.nan, right=np.nan)

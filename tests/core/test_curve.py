@@ -52,6 +52,12 @@ def test_a_peak_without_a_parabola_is_the_largest_sample_or_lies_among_its_neigh
     assert force == pytest.approx(max(load), rel=0.2)
 
 
+def test_an_end_off_by_round_off_is_the_end():
+    curve = LoadCurve(np.arange(3.0), np.array([0, 1e-4, 2e-4 * (1 - 1e-9)]), np.array([0, 5.0, 8.0]))
+    np.testing.assert_allclose(curve.load_at(np.array([2e-4])), [8.0], rtol=1e-14)
+    assert np.isnan(curve.load_at(np.array([2.0001e-4]))).all()
+
+
 def test_a_saw_tooth_uses_the_first_passage():
     curve = LoadCurve(np.arange(5.0), np.array([0, 2, 1, 2, 3.0]), np.array([0, 20, 5, 99, 30.0]))
     np.testing.assert_allclose(curve.load_at(np.array([1.0, 2.0, 2.5])), [10, 20, 25], rtol=1e-14)  # by hand
