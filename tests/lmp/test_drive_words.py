@@ -33,7 +33,9 @@ def words(**other: str) -> str:
 
 def test_good_words_are_taken(lmp: Any) -> None:
     lmp.command(words(more="record 10 frames 2 1e-5 2e-5 clock 2 0 0 1e-4 12"))
+    assert lmp.has_id("fix", "drive")
     lmp.command("unfix drive")
+    assert not lmp.has_id("fix", "drive")
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,8 @@ def pulls(rows: np.ndarray, at: np.ndarray, style: str) -> np.ndarray:
     return rows[:, :1] * along + rows[:, 1:2] * lever * np.column_stack([-along[:, 1], along[:, 0]])
 
 
-def compared(names: list[str], style: str) -> None:
+def assert_as_defined(names: list[str], style: str) -> None:
+    """Every number of every step of these laws' paths, and the forces on the particles."""
     laws, paths = [TABLE[n][0] for n in names], [TABLE[n][1] for n in names]
     expected = [python(law, path) for law, path in zip(laws, paths, strict=True)]
     natural = np.array([scales(law, rows) for law, rows in zip(laws, expected, strict=True)])
@@ -119,10 +120,10 @@ def compared(names: list[str], style: str) -> None:
 
 @pytest.mark.parametrize("style", [SMALL, FINITE])
 def test_laws_without_time(style: str) -> None:
-    compared(TIMELESS, style)
+    assert_as_defined(TIMELESS, style)
 
 
 @pytest.mark.parametrize("style", [SMALL, FINITE])
 @pytest.mark.parametrize("name", TIMED)
 def test_laws_that_creep(name: str, style: str) -> None:
-    compared([name], style)
+    assert_as_defined([name], style)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,27 +91,22 @@ class _Counting(Silent):
         self.names.append(name)
 
 
+def identified(folder: Path, setting: str, grid: tuple[float, ...]) -> tuple[dict[str, Any], list[str]]:
+    """The result of a bundle of known truth under a setting, and the names of what was simulated for it."""
+    bundle, how, told = make_bundle(folder / "bundle"), folder / "settings.toml", _Counting()
+    how.write_text(f"{setting}\nplacement_count = 0\nrecentring_count = 0\n", "utf-8")
+    fixed: dict[str, Any] = {"engine": "equilibrium", "objective": "both", "workers": 1}
+    identify(bundle, folder / "out", grid=grid, config=how, progress=told, **fixed)
+    result = json.loads((folder / "out" / "result.json").read_text("utf-8"))
+    assert result["f_max_n"] == pytest.approx(F_MAX, rel=0.03)  # the bundle's noise alone gives 2 %
+    assert result["delta_max_m"] == pytest.approx(DELTA_MAX, rel=0.04)  # as much
+    return result, told.names
+
+
 def test_an_identification_by_the_scaling_law_needs_fewer_simulations(tmp_path: Path) -> None:
-    bundle = make_bundle(tmp_path / "bundle")
-    how = tmp_path / "scaling.toml"
-    how.write_text("scaling = true\nplacement_count = 0\nrecentring_count = 0\n", "utf-8")
-    told = _Counting()
-    grid = (0.9, 1.0, 1.1)
-    identify(
-        bundle,
-        tmp_path / "out",
-        engine="equilibrium",
-        objective="both",
-        grid=grid,
-        config=how,
-        workers=1,
-        progress=told,
-    )
-    spared = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
-    assert len(told.names) == 8  # 9 nodes, three of one ratio, and the optimum
-    assert any("for 3 nodes of this ratio" in name for name in told.names)
-    assert spared["f_max_n"] == pytest.approx(F_MAX, rel=0.03)  # the bundle's noise alone gives 2 %
-    assert spared["delta_max_m"] == pytest.approx(DELTA_MAX, rel=0.04)
+    _, names = identified(tmp_path, "scaling = true", (0.9, 1.0, 1.1))
+    assert len(names) == 8  # 9 nodes, three of one ratio, and the optimum
+    assert any("for 3 nodes of this ratio" in name for name in names)
 
 
 def test_finite_kinematics_do_not_scale(tmp_path: Path) -> None:
@@ -155,22 +151,6 @@ def test_a_few_ratios_stand_for_the_grid(two_strengths: Problem) -> None:
 
 
 def test_an_identification_between_ratios_says_how_far_it_errs(tmp_path: Path) -> None:
-    bundle = make_bundle(tmp_path / "bundle")
-    how = tmp_path / "ratios.toml"
-    how.write_text("ratio_count = 5\nplacement_count = 0\nrecentring_count = 0\n", "utf-8")
-    grid, told = (0.8, 0.9, 1.0, 1.1, 1.2), _Counting()
-    identify(
-        bundle,
-        tmp_path / "out",
-        engine="equilibrium",
-        objective="both",
-        grid=grid,
-        config=how,
-        workers=1,
-        progress=told,
-    )
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
-    assert len(told.names) == 6  # five ratios and the optimum
+    result, names = identified(tmp_path, "ratio_count = 5", (0.8, 0.9, 1.0, 1.1, 1.2))
+    assert len(names) == 6  # five ratios and the optimum
     assert any("left out in turn is missed by" in remark for remark in result["remarks"])
-    assert result["f_max_n"] == pytest.approx(F_MAX, rel=0.03)  # the bundle's noise alone gives 2 %
-    assert result["delta_max_m"] == pytest.approx(DELTA_MAX, rel=0.04)
