@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 from scipy.linalg.blas import dsymv
 
 from pipeline.core.problem import BondLaw
 from pipeline.equilibrium.assembly import Assembly, assembly
 from pipeline.equilibrium.cholesky import Plan, available
-from pipeline.equilibrium.factor import Solve, factorise_elastic, rough_solve, singular
+from pipeline.equilibrium.factor import Solve, factorise_elastic, rough_dense_solve, rough_solve, singular
 from pipeline.equilibrium.far import FarField, factorise_far
 from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import ElasticResponse, State, WholeModel
@@ -79,13 +79,8 @@ class CondensedNetwork:
         strip = self.plan.factor(inner, single=True).solve if self.plan else rough_solve(inner, ordered=True)
         if not apart.size:
             return strip
-        factor = linalg.cho_factor(apart.astype(np.float32), lower=True, overwrite_a=True, check_finite=False)
-
-        def solve(right: np.ndarray) -> np.ndarray:
-            last = right[self.kept :].astype(np.float32)
-            return np.append(strip(right[: self.kept]), linalg.cho_solve(factor, last, check_finite=False))
-
-        return solve
+        islands = rough_dense_solve(apart)
+        return lambda right: np.append(strip(right[: self.kept]), islands(right[self.kept :]))
 
     def exact(self, weight: np.ndarray) -> Solve:
         """Displacements (q,), m, under forces (q,), N, without islands; refuses what can move without resistance."""

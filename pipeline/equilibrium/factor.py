@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from pipeline.core.errors import InputError
@@ -13,6 +13,7 @@ from pipeline.core.errors import InputError
 Solve = Callable[[np.ndarray], np.ndarray]
 
 SYMMETRIC = {"SymmetricMode": True}
+SMALLEST = 1e-7  # of the largest eigenvalue: smaller ones, and negative ones, are round-off of single precision
 
 
 def factorise(stiffness: sparse.csc_array) -> SuperLU:
@@ -57,6 +58,18 @@ def rough_solve(stiffness: sparse.csc_array, ordered: bool = False) -> Solve:
     )
     factor = splu(single, permc_spec=order, diag_pivot_thresh=0.0, options=SYMMETRIC)
     return lambda right: factor.solve(right.astype(np.float32)).astype(float)
+
+
+def rough_dense_solve(stiffness: np.ndarray) -> Solve:
+    """The same for a dense matrix (q, q); where it is definite but for round-off, its eigenvalues are raised."""
+    single = stiffness.astype(np.float32)
+    try:
+        factor = linalg.cho_factor(single, lower=True, overwrite_a=True, check_finite=False)
+    except linalg.LinAlgError:
+        strength, shape = linalg.eigh(stiffness)
+        strength = np.maximum(strength, SMALLEST * strength[-1])
+        return lambda right: shape @ (shape.T @ right / strength)
+    return lambda right: linalg.cho_solve(factor, right.astype(np.float32), check_finite=False).astype(float)
 
 
 def reordered(solve: Solve, order: np.ndarray) -> Solve:
