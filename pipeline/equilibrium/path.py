@@ -128,6 +128,8 @@ class Path:
         if rough is None:
             rough = self._machine(before, state, wanted / 2**HALVINGS, np.inf)
         if rough is None:
+            rough = self._forced(state, wanted / 2**HALVINGS)
+        if rough is None:
             raise ConvergenceError(
                 f"no equilibrium found beyond CMOD = {state.cmod * 1e3:.4g} mm (load {state.load:.4g} N): "
                 "allow more iterations, smaller increments or a larger tolerance"
@@ -175,6 +177,12 @@ class Path:
         found = (by or self.stepper).by_machine(state, guess, machine)
         opened = found is not None and 0 < found.cmod - state.cmod <= allowed
         return found if opened else None
+
+
+    def _forced(self, state: State, wanted: float) -> State | None:
+        """Where the machine should move back, but no equilibrium has that CMOD either: it moves on, the crack jumps."""
+        found = self.stepper.by_machine(state, state.free, state.machine + self._stiff * wanted)
+        return found if found is not None and found.cmod > state.cmod else None
 
 
 def _lost(state: State, found: State) -> float:

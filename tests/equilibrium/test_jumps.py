@@ -49,3 +49,14 @@ def test_a_machine_that_only_moves_forward_sets_more_free(solutions: dict[bool, 
     assert forward.energy.damping > 1.5 * free.energy.damping
     # the same crack: scattered strengths decide where it runs, not how it is driven
     assert forward.energy.dissipated == pytest.approx(free.energy.dissipated, rel=0.01)
+
+
+# relative scatter of strength, and δ_max (m): no equilibrium has the next CMOD, wherever the machine is
+@pytest.mark.parametrize(("scatter", "opening"), [(0.5, 0.15e-4), (0.7, 0.2e-4), (0.9, 0.3e-4)])
+def test_a_crack_goes_on_where_neither_control_has_an_equilibrium(scatter: float, opening: float) -> None:
+    problem = fracture_test(radius=2.5 * MM, scatter=scatter, opening=opening)
+    solution = solve(problem)
+    assert solution.converged
+    assert solution.curve.cmod[-1] == pytest.approx(problem.cmod_max)
+    assert "jumped" in solution.message
+    assert solution.energy.error < 1e-3  # what is set free is counted
