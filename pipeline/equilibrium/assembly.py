@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from pipeline.equilibrium.factor import factorise
-
 
 @dataclass(frozen=True)
 class Assembly:
@@ -32,15 +30,6 @@ class Assembly:
         data[self.place] += support.ravel()
         size = self.indptr.size - 1
         return sparse.csc_array((data, self.indices, self.indptr), shape=(size, size))
-
-    def order(self) -> np.ndarray:
-        """A good order of elimination (q,) of the variables.
-
-        The pattern counts alone, with entries that cancel in some stiffness: ones, and a diagonal that dominates them.
-        """
-        size = self.indptr.size - 1
-        pattern = sparse.csc_array((np.ones(self.indices.size), self.indices, self.indptr), shape=(size, size))
-        return np.argsort(factorise(pattern + 2 * size * sparse.eye_array(size, format="csc")).perm_c)
 
 
 def assembly(jacobian: sparse.csr_array, edge: np.ndarray) -> Assembly:

@@ -16,8 +16,9 @@ from scipy.linalg.blas import dsymv
 from pipeline.core.problem import BondLaw
 from pipeline.equilibrium.assembly import Assembly, assembly
 from pipeline.equilibrium.cholesky import Plan, available
+from pipeline.equilibrium.dissection import dissected
 from pipeline.equilibrium.factor import Solve, factorise_elastic, rough_dense_solve, rough_solve, singular
-from pipeline.equilibrium.far import FarField, factorise_far
+from pipeline.equilibrium.far import FarField, solve_far
 from pipeline.equilibrium.islands import Islands, joined, no_islands
 from pipeline.equilibrium.model import ElasticResponse, State, WholeModel
 from pipeline.equilibrium.network import SmallNetwork
@@ -233,14 +234,15 @@ def condense(whole: WholeModel, active: np.ndarray) -> CondensedModel:
     stiffness = rigid.stiffness(elastic, whole.gauge, 0.0).tocsr()
     pull, load = rigid.pull(elastic * rigid.drive, whole.gauge, 0.0)
     kept = kept[_order(network, followed, kept, stiffness)]
+    inner = inner[dissected(stiffness[inner][:, inner], network.place[inner])]
     inside = stiffness[inner][:, inner].tocsc()
-    factor, solve = factorise_far(inside)
+    solve = solve_far(inside)
     far = FarField(inner, solve, stiffness[inner][:, kept].tocsr(), pull[inner])
     edge = np.flatnonzero(np.diff(stiffness[kept].indptr))
     held = kept[edge]
     outer = sparse.block_array([[stiffness[held][:, held], pull[held, None]], [pull[None, held], [[load]]]]).tocsc()
     across = sparse.hstack([far.coupling[:, edge], far.drive[:, None]]).tocsc()
-    support = schur_complement(inside, across, outer, factor)
+    support = schur_complement(inside, across, outer, solve)
     bonds = network.part(followed, kept)
     islands = no_islands(edge.size, inner.size)
     frame = assembly(bonds.jacobian, edge)
@@ -311,4 +313,5 @@ def _order(network: SmallNetwork, followed: np.ndarray, kept: np.ndarray, far: s
     `far` (all, all) is the stiffness of the other bonds.
     """
     edge = np.flatnonzero(np.diff(far[kept].indptr))
-    return assembly(network.part(followed, kept).jacobian, edge).order()
+    strip = network.part(followed, kept)
+    return dissected(abs(strip.transpose) @ abs(strip.jacobian), strip.place, last=edge)

@@ -43,9 +43,17 @@ class Constraints:
 
     def restrict(self, moved: np.ndarray) -> np.ndarray:
         """Free variables (q,), m, of all degrees of freedom (n, per), m."""
-        kept = np.ones(self.drive.size, bool)
-        kept[self.dependent] = False
-        return moved.reshape(-1)[kept]
+        return moved.reshape(-1)[self._kept]
+
+    @property
+    def particles(self) -> np.ndarray:
+        """The particle (q,) int that each free variable moves."""
+        return self._kept // self.per
+
+    @property
+    def _kept(self) -> np.ndarray:
+        """The degrees of freedom (q,) int that are the free variables."""
+        return np.setdiff1d(np.arange(self.drive.size), self.dependent)
 
     def reactions(self, internal: np.ndarray) -> np.ndarray:
         """Forces (c,), N, of the grips along their directions, from internal forces (per n,), N.

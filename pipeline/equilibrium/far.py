@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU
 
 from pipeline.equilibrium.cholesky import available, whole_factor
-from pipeline.equilibrium.factor import Solve, factorise, factorise_elastic, reordered, singular
+from pipeline.equilibrium.factor import Solve, factorise_elastic, singular
 from pipeline.equilibrium.islands import Islands
 
 BATCH = 64  # right-hand sides at a time
@@ -21,7 +20,7 @@ class FarField:
 
     Parameters
     ----------
-    inner : (f,) int array; eliminated variables, numbered in the whole model
+    inner : (f,) int array; eliminated variables, numbered in the whole model, in a good order of elimination
     solve : function; K_ff⁻¹ b of right-hand sides (f,) or (f, k), N
     coupling : (f, k) sparse array K_fk, and drive (f,) array K_fs, N/m
     """
@@ -42,8 +41,8 @@ class FarField:
         return np.hstack(parts)
 
 
-def factorise_far(stiffness: sparse.csc_array) -> tuple[SuperLU, Solve]:
-    """The factorised stiffness K_ff, and solutions with it by the compiled library where it was built.
+def solve_far(stiffness: sparse.csc_array) -> Solve:
+    """Solutions with the stiffness K_ff, its variables in a good order of elimination.
 
     Raises
     ------
@@ -51,14 +50,8 @@ def factorise_far(stiffness: sparse.csc_array) -> tuple[SuperLU, Solve]:
         if it is singular: particles that may move although all kept ones are held
     """
     if not available():
-        slow = factorise_elastic(stiffness)
-        return slow, slow.solve
-    try:
-        factor = factorise(stiffness)
-    except RuntimeError:
-        raise singular() from None
-    order = np.argsort(factor.perm_c)
-    faster = whole_factor(stiffness[order][:, order])
-    if faster.raised:
+        return factorise_elastic(stiffness).solve
+    factor = whole_factor(stiffness)
+    if factor.raised:
         raise singular()
-    return factor, reordered(faster.solve, order)
+    return factor.solve

@@ -18,6 +18,7 @@ from pipeline.core.problem import Kinematics, Problem, SlidingLaw
 from pipeline.equilibrium.assembly import Assembly, assembly
 from pipeline.equilibrium.cholesky import Plan, available
 from pipeline.equilibrium.constraints import Constraints, eliminate
+from pipeline.equilibrium.dissection import dissected
 from pipeline.equilibrium.factor import Solve, reordered, rough_solve
 
 
@@ -53,11 +54,13 @@ class SmallNetwork:
     ----------
     jacobian : (m, q) sparse array C, and its transpose
     drive : (m,) array β
+    place : (q, 2) array, m; where the particles are that the variables move
     """
 
     jacobian: sparse.csr_array
     transpose: sparse.csr_array
     drive: np.ndarray
+    place: np.ndarray
 
     def opening(self, free: np.ndarray, machine: float) -> np.ndarray:
         return self.jacobian @ free + machine * self.drive
@@ -81,15 +84,14 @@ class SmallNetwork:
     @cached_property
     def _frame(self) -> tuple[np.ndarray, Assembly, Plan]:
         """A good order of elimination (q,) of the variables; assembly and plan of the stiffness in that order."""
-        nowhere = np.zeros(0, int)
-        order = assembly(self.jacobian, nowhere).order()
-        frame = assembly(self.jacobian[:, order].tocsr(), nowhere)
+        order = dissected(abs(self.transpose) @ abs(self.jacobian), self.place)
+        frame = assembly(self.jacobian[:, order].tocsr(), np.zeros(0, int))
         return order, frame, Plan(frame.stiffness(np.ones(self.drive.size), np.zeros((0, 0))))
 
     def part(self, bonds: np.ndarray, variables: np.ndarray) -> SmallNetwork:
         """Some of the bonds, in some of the variables; no others may move them."""
         jacobian = self.jacobian[bonds][:, variables].tocsr()
-        return small_network(jacobian, self.drive[bonds])
+        return small_network(jacobian, self.drive[bonds], self.place[variables])
 
 
 @dataclass(frozen=True)
@@ -163,13 +165,13 @@ class FiniteNetwork:
         return now / distance[:, None], self.length / distance
 
 
-def small_network(jacobian: sparse.csr_array, drive: np.ndarray) -> SmallNetwork:
+def small_network(jacobian: sparse.csr_array, drive: np.ndarray, place: np.ndarray) -> SmallNetwork:
     """The network with these openings a unit of its variables, and of the machine; 32-bit indices are read faster."""
     forth, back = (
         sparse.csr_array((m.data, m.indices.astype(np.int32), m.indptr.astype(np.int32)), shape=m.shape)
         for m in (jacobian, jacobian.T.tocsr())
     )
-    return SmallNetwork(forth, back, drive)
+    return SmallNetwork(forth, back, drive, place)
 
 
 def whole_network(problem: Problem) -> tuple[SmallNetwork | FiniteNetwork, Constraints]:
@@ -183,7 +185,8 @@ def whole_network(problem: Problem) -> tuple[SmallNetwork | FiniteNetwork, Const
         return FiniteNetwork(length, direction, pairs, constraints, lever), constraints
     full = _jacobian(direction, pairs, constraints, lever)
     jacobian = (full @ constraints.expand).tocsr()
-    return small_network(jacobian, full @ constraints.drive), constraints
+    place = problem.particles.position[constraints.particles]
+    return small_network(jacobian, full @ constraints.drive, place), constraints
 
 
 def _jacobian(

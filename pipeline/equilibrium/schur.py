@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from pipeline.equilibrium.cholesky import available, whole_factor
-from pipeline.equilibrium.factor import SYMMETRIC
+from pipeline.equilibrium.factor import SYMMETRIC, Solve
 
 
 def schur_complement(
-    inside: sparse.csc_array, across: sparse.csc_array, outer: sparse.csc_array, factor: SuperLU
+    inside: sparse.csc_array, across: sparse.csc_array, outer: sparse.csc_array, solve: Solve
 ) -> np.ndarray:
-    """D − Bᵀ A⁻¹ B (b, b) of symmetric [[A, B], [Bᵀ, D]], with A factorised.
+    """D − Bᵀ A⁻¹ B (b, b) of symmetric [[A, B], [Bᵀ, D]], with solutions of A, its variables in a good order.
 
     It is the last block of the factors of the whole matrix with D ordered last, at the price of one
     factorisation instead of b solutions. D is made heavier before and lighter after: the whole may be singular.
     """
-    order = np.argsort(factor.perm_c)
     ballast = 2 * np.abs(outer.diagonal()) + np.abs(outer.diagonal()).mean()
-    matrix = sparse.block_array(
-        [[inside[order][:, order], across[order]], [across[order].T, outer + sparse.diags_array(ballast)]]
-    ).tocsc()
+    matrix = sparse.block_array([[inside, across], [across.T, outer + sparse.diags_array(ballast)]]).tocsc()
     schur = _last_product(matrix, ballast.size)
     if schur is None:
-        schur = outer.toarray() - across.T @ factor.solve(across.toarray())
+        schur = outer.toarray() - across.T @ solve(across.toarray())
     else:
         schur[np.diag_indices_from(schur)] -= ballast
     return 0.5 * (schur + schur.T)

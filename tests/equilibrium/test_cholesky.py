@@ -50,6 +50,15 @@ def test_solutions_are_those_of_dense_algebra(size: int, density: float, seed: i
         assert factor.solve(right[:, 0]) == pytest.approx(exact[:, 0], abs=error)
 
 
+@given(size=st.integers(1, 60), density=st.floats(0, 3), seed=st.integers(0, 10**6))
+def test_the_last_block_is_that_of_the_dense_factor(size: int, density: float, seed: int) -> None:
+    """Whatever order is eliminated in, that which was given is answered in."""
+    matrix, count = stiffness(size, int(density * size), seed), (size + 1) // 2
+    exact = np.linalg.cholesky(matrix.toarray())[size - count :, size - count :]
+    found = Plan(matrix).factor(matrix, single=False).last(count)
+    assert found == pytest.approx(exact, abs=1e-12)  # round-off times the condition number
+
+
 def test_one_plan_serves_all_matrices_of_its_pattern() -> None:
     first = stiffness(400, 900, 1)
     plan, right = Plan(first), np.ones(400)

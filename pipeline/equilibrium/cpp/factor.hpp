@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "blas.hpp"
+#include "lanes.hpp"
 #include "plan.hpp"
 
 struct CholeskyFactor {
@@ -39,7 +40,8 @@ class Factor : public CholeskyFactor {
   void solve(double *side, int64_t count) const override {
     const std::unique_ptr<T[]> memory(new T[count * (plan_.size + plan_.highest)]);
     T *x = memory.get(), *part = x + count * plan_.size;
-    std::copy(side, side + count * plan_.size, x);
+    for (int64_t i = 0; i < plan_.size; ++i)
+      for (int64_t k = 0; k < count; ++k) x[i * count + k] = static_cast<T>(side[plan_.order[i] * count + k]);
     for (const Front &front : plan_.front) {
       if (count == 1)
         forward(front, x, part);
@@ -52,30 +54,39 @@ class Factor : public CholeskyFactor {
       else
         backward(*front, x, part, static_cast<int>(count));
     }
-    std::copy(x, x + count * plan_.size, side);
+    for (int64_t i = 0; i < plan_.size; ++i)
+      for (int64_t k = 0; k < count; ++k) side[plan_.order[i] * count + k] = x[i * count + k];
   }
 
   void last(int64_t count, double *last) const override {
     const int64_t skipped = plan_.size - count;
     std::fill(last, last + count * count, 0.0);
     for (const Front &front : plan_.front)
-      for (int64_t j = std::max<int64_t>(0, skipped - front.first); j < front.columns; ++j) {
-        const T *column = panel(front) + j * front.height();
-        double *into = last + (front.first + j - skipped);
-        for (int64_t i = j; i < front.columns; ++i) into[(front.first + i - skipped) * count] = column[i];
-        for (int64_t i = 0; i < front.below; ++i) into[(rows(front)[i] - skipped) * count] = column[front.columns + i];
+      for (int32_t j = 0; j < front.columns; ++j) {
+        const int64_t into = plan_.order[front.first + j] - skipped;
+        if (into < 0) continue;
+        const T *column = panel(front) + static_cast<int64_t>(j) * front.height();
+        const auto put = [&](int32_t i, T number) {
+          const int64_t row = plan_.order[i] - skipped;
+          if (row >= 0) last[row * count + into] = number;  // others are zeros that were stored for one front less
+        };
+        for (int32_t i = j; i < front.columns; ++i) put(front.first + i, column[i]);
+        for (int32_t i = 0; i < front.below; ++i) put(rows(front)[i], column[front.top() + i]);
       }
   }
 
  private:
-  static constexpr int kBlock = 32;  // columns factorised at a time
-  static constexpr int kLanes = 64 / sizeof(T);
+  static constexpr int kBlock = 32;      // columns factorised at a time
+  static constexpr int kAhead = 1 << 14;  // bytes between what is used and what is fetched
 
   const Plan &plan_;
   const Blas<T> &blas_;
   std::unique_ptr<T[]> panels_;
 
   T *panel(const Front &front) const { return panels_.get() + front.panel; }
+  T *corner(const Front &front, int first) const {
+    return panel(front) + static_cast<int64_t>(front.height()) * front.columns + first * kLanes;
+  }
   const int32_t *rows(const Front &front) const { return plan_.row.data() + front.rows; }
 
   // Adds what a child left, lower half, to a front.
@@ -85,7 +96,7 @@ class Factor : public CholeskyFactor {
     for (int j = 0; j < child.below; ++j, left += child.below) {
       const int64_t column = place[j];
       T *into = column < front.columns ? panel(front) + column * front.height()
-                                       : rest + (column - front.columns) * front.below - front.columns;
+                                       : rest + (column - front.top()) * front.below - front.top();
       for (int i = j; i < child.below; ++i) into[place[i]] += left[i];
     }
   }
@@ -107,7 +118,23 @@ class Factor : public CholeskyFactor {
       }
     }
     if (front.below)
-      blas_.subtract_square(front.below, front.columns, panel(front) + front.columns, height, rest, front.below);
+      blas_.subtract_square(front.below, front.columns, panel(front) + front.top(), height, rest, front.below);
+    for (int first = 0; first < front.columns; first += kLanes)
+      invert(panel(front) + first * step + first, std::min(kLanes, front.columns - first), height,
+             corner(front, first));
+  }
+
+  // The inverse of a lower triangle (n, n), column by column, among zeros.
+  static void invert(const T *lower, int n, int64_t height, T *inverse) {
+    for (int j = 0; j < n; ++j) {
+      T *x = inverse + j * kLanes;
+      x[j] = 1;
+      for (int k = j; k < n; ++k) {
+        const T *column = lower + k * height;
+        x[k] /= column[k];
+        for (int i = k + 1; i < n; ++i) x[i] -= column[i] * x[k];
+      }
+    }
   }
 
   // The Cholesky factor (n, n) in the lower half of a block; too small pivots are raised to `least` (n,).
@@ -131,29 +158,65 @@ class Factor : public CholeskyFactor {
 
   // One right-hand side x: L⁻¹ x within a front, and what that takes from the rows below.
   void forward(const Front &front, T *x, T *part) const {
-    T *own = x + front.first;
-    const T *column = panel(front);
-    for (int j = 0; j < front.columns; ++j, column += front.height()) {
-      own[j] /= column[j];
-      for (int i = j + 1; i < front.columns; ++i) own[i] -= column[i] * own[j];
+    T *own = x + front.first, *below = part + front.top();
+    std::fill(std::copy(own, own + front.columns, part), part + front.height(), T(0));
+    for (int first = 0; first < front.columns; first += kLanes) {
+      const Columns block = columns(front, first);
+      const Lanes<T> right = lanes(part + first);
+      Lanes<T> found = {};
+      for (int k = 0; k < kLanes; ++k) found += lanes(block.corner + k * kLanes) * right[k];
+      lanes(part + first) = found;
+      for (int i = first + kLanes; i < front.height(); i += kLanes) {
+        fetch(block.column[0] + (i - first) * kLanes, kAhead);
+        Lanes<T> left = lanes(part + i);
+        for (int k = 0; k < kLanes; ++k) left -= lanes(block.column[k] + i) * found[k];
+        lanes(part + i) = left;
+      }
     }
-    std::fill(part, part + front.below, T(0));
-    add_product(panel(front) + front.columns, front.height(), front.below, front.columns, own, part);
+    std::copy(part, part + front.columns, own);
     const int32_t *row = rows(front);
-    for (int i = 0; i < front.below; ++i) x[row[i]] -= part[i];
+    for (int i = 0; i < front.below; ++i) x[row[i]] += below[i];
   }
 
   void backward(const Front &front, T *x, T *part) const {
-    T *own = x + front.first;
+    T *own = x + front.first, *below = part + front.top();
     const int32_t *row = rows(front);
-    std::copy(own, own + front.columns, part);
-    for (int i = 0; i < front.below; ++i) part[front.columns + i] = x[row[i]];
-    const T *column = panel(front) + static_cast<int64_t>(front.columns) * front.height();
-    for (int j = front.columns - 1; j >= 0; --j) {
-      column -= front.height();
-      part[j] = (part[j] - product(column + j + 1, part + j + 1, front.height() - j - 1)) / column[j];
+    std::fill(std::copy(own, own + front.columns, part), part + front.height(), T(0));
+    for (int i = 0; i < front.below; ++i) below[i] = x[row[i]];
+    for (int first = front.top() - kLanes; first >= 0; first -= kLanes) {
+      const Columns block = columns(front, first);
+      Lanes<T> share[kLanes] = {};
+      for (int i = first + kLanes; i < front.height(); i += kLanes) {
+        fetch(block.column[0] + (i - first) * kLanes, -kAhead);
+        const Lanes<T> right = lanes(part + i);
+        for (int k = 0; k < kLanes; ++k) share[k] += lanes(block.column[k] + i) * right;
+      }
+      const Lanes<T> left = lanes(part + first) - sums<T>(share);
+      for (int k = 0; k < kLanes; ++k) share[k] = lanes(block.corner + k * kLanes) * left;
+      lanes(part + first) = sums<T>(share);
     }
     std::copy(part, part + front.columns, own);
+  }
+
+  // Has the numbers read that will be needed soon: panels lie behind one another in the order of elimination, but each
+  // is read in several short columns, in which the processor sees no order.
+  static void fetch(const T *at, int bytes) {
+    const char *from = reinterpret_cast<const char *>(at) + bytes;
+    for (size_t k = 0; k < kLanes * kLanes * sizeof(T); k += 64) __builtin_prefetch(from + k);
+  }
+
+  // Neighbouring columns of a front and the inverse of their diagonal block; where there are fewer, the last stands in
+  // for the others and the inverse is zero there.
+  struct Columns {
+    const T *column[kLanes], *corner;
+  };
+
+  Columns columns(const Front &front, int first) const {
+    Columns block;
+    for (int k = 0; k < kLanes; ++k)
+      block.column[k] = panel(front) + static_cast<int64_t>(std::min(first + k, front.columns - 1)) * front.height();
+    block.corner = corner(front, first);
+    return block;
   }
 
   // The same for several, row by row.
@@ -164,7 +227,7 @@ class Factor : public CholeskyFactor {
     if (std::all_of(own, own + step * front.columns, [](T number) { return number == 0; })) return;  // often: few loads
     blas_.divide("T", count, front.columns, panel(front), height, own, count);
     if (!front.below) return;
-    blas_.subtract("T", count, front.below, front.columns, own, count, panel(front) + front.columns, height, 0, part,
+    blas_.subtract("T", count, front.below, front.columns, own, count, panel(front) + front.top(), height, 0, part,
                    count);
     const int32_t *row = rows(front);
     for (int i = 0; i < front.below; ++i)
@@ -178,33 +241,9 @@ class Factor : public CholeskyFactor {
     const int32_t *row = rows(front);
     for (int i = 0; i < front.below; ++i) std::copy(x + step * row[i], x + step * (row[i] + 1), part + step * i);
     if (front.below)
-      blas_.subtract("N", count, front.columns, front.below, part, count, panel(front) + front.columns, height, 1, own,
+      blas_.subtract("N", count, front.columns, front.below, part, count, panel(front) + front.top(), height, 1, own,
                      count);
     blas_.divide("N", count, front.columns, panel(front), height, own, count);
-  }
-
-  // into += A x for the (rows, columns) numbers of A; four columns at a time read and write `into` less often.
-  static void add_product(const T *a, int height, int rows, int columns, const T *x, T *into) {
-    const int64_t step = height;
-    int j = 0;
-    for (; j + 4 <= columns; j += 4, a += 4 * step) {
-      const T *b = a + step, *c = b + step, *d = c + step;
-      const T p = x[j], q = x[j + 1], r = x[j + 2], s = x[j + 3];
-      for (int i = 0; i < rows; ++i) into[i] += (a[i] * p + b[i] * q) + (c[i] * r + d[i] * s);
-    }
-    for (; j < columns; ++j, a += step)
-      for (int i = 0; i < rows; ++i) into[i] += a[i] * x[j];
-  }
-
-  // a·b of n numbers, in sums side by side that the processor takes at once.
-  static T product(const T *a, const T *b, int n) {
-    T sum[kLanes] = {}, all = 0;
-    int i = 0;
-    for (; i + kLanes <= n; i += kLanes)
-      for (int k = 0; k < kLanes; ++k) sum[k] += a[i + k] * b[i + k];
-    for (; i < n; ++i) all += a[i] * b[i];
-    for (int k = 0; k < kLanes; ++k) all += sum[k];
-    return all;
   }
 };
 
