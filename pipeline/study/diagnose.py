@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.config import RunSettings
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.diagnosis import FACTORS, Diagnosis
 from pipeline.gap.diagnosis import diagnose as judge
@@ -15,7 +16,7 @@ from pipeline.gap.effects import effect, library
 from pipeline.gap.library import nearest, shipped
 from pipeline.gap.together import Together, together
 from pipeline.gap.transfer import Test
-from pipeline.store.bundle import read_bundle
+from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.layouts import DIAGNOSE
 from pipeline.store.results import write_arrays, write_result
 from pipeline.store.start import start_parameters
@@ -25,6 +26,8 @@ from pipeline.study.diagnose_case import ENGINE, Case, prepared
 from pipeline.study.diagnose_result import bond_area, diagnosis_result, sentence
 from pipeline.study.diagnose_together import folders, sentence_together, together_result
 from pipeline.study.output import joint_folder, results_folder
+
+Prepare = Callable[[Bundle, Path, str, RunSettings, Progress], Case]
 
 
 def diagnose(
@@ -40,6 +43,8 @@ def diagnose(
     workers: int | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
+    prepare: Prepare = prepared,
+    page: bool = True,
 ) -> str:
     """Diagnose the gap of one test, or of several together; writes result.json, results.h5, figures, report.
 
@@ -52,6 +57,8 @@ def diagnose(
     out : folder
     grid : factors of the start, wider by default than those of an identification
     without : effects left out of the library
+    prepare : makes a bundle ready
+    page : whether figures and report.html are made
     the others : override the settings of `config`
     """
     options = {"radius_mm": radius_mm, "accuracy": accuracy, "workers": workers, "seed": seed}
@@ -62,27 +69,33 @@ def diagnose(
     read = [read_bundle(path) for path in bundles]
     started = time.monotonic()
     if len(read) == 1:
-        case = prepared(read[0], results_folder(out, read[0]), chosen, settings, progress)
-        return sentence(judged(case, chosen, settings.seed, names, grid or FACTORS, started)[0])
+        case = prepare(read[0], results_folder(out, read[0]), chosen, settings, progress)
+        return sentence(judged(case, chosen, settings.seed, names, grid or FACTORS, started, page)[0])
     places = folders(read)
     folder = joint_folder(out, list(places))
     cases, found, warned = {}, [], {}
     for name, bundle in places.items():
         progress.stage(name)
         began = time.monotonic()
-        cases[name] = prepared(bundle, results_folder(folder / name, bundle), chosen, settings, progress)
-        diagnosis, warned[name] = judged(cases[name], chosen, settings.seed, names, grid or FACTORS, began)
+        cases[name] = prepare(bundle, results_folder(folder / name, bundle), chosen, settings, progress)
+        diagnosis, warned[name] = judged(cases[name], chosen, settings.seed, names, grid or FACTORS, began, page)
         found.append(diagnosis)
     joint = together(
         [_test(name, case, d) for (name, case), d in zip(cases.items(), found, strict=True)],
         np.random.default_rng(settings.seed),
     )
-    conclude(folder, cases, joint, warned, chosen, time.monotonic() - started)
+    conclude(folder, cases, joint, warned, chosen, time.monotonic() - started, page)
     return sentence_together(joint)
 
 
 def judged(
-    case: Case, engine: str, seed: int, names: Sequence[str], grid: tuple[float, ...], started: float
+    case: Case,
+    engine: str,
+    seed: int,
+    names: Sequence[str],
+    grid: tuple[float, ...],
+    started: float,
+    page: bool = True,
 ) -> tuple[Diagnosis, list[str]]:
     """Diagnose one test and write its results; the clock stood at `started` (s) when work on it began.
 
@@ -100,9 +113,10 @@ def judged(
     result["seconds_simulating"] = sum(case.simulator.spent)
     write_arrays(case.folder, DIAGNOSE, diagnosis_arrays(diagnosis, case.band.path))
     write_result(case.folder, result)
-    from pipeline.study.diagnose_page import diagnosis_page
+    if page:
+        from pipeline.study.diagnose_page import diagnosis_page
 
-    diagnosis_page(case, diagnosis, result)
+        diagnosis_page(case, diagnosis, result)
     return diagnosis, result["warnings"]
 
 
@@ -129,12 +143,19 @@ def _test(name: str, case: Case, diagnosis: Diagnosis) -> Test:
 
 
 def conclude(
-    folder: Path, cases: dict[str, Case], joint: Together, warned: dict[str, list[str]], engine: str, seconds: float
+    folder: Path,
+    cases: dict[str, Case],
+    joint: Together,
+    warned: dict[str, list[str]],
+    engine: str,
+    seconds: float,
+    page: bool = True,
 ) -> None:
     """Write what several tests say together."""
     result = together_result(cases, joint, warned) | {"seconds": seconds, "engine": engine}
     result["seconds_simulating"] = sum(sum(c.simulator.spent) for c in cases.values())
     write_result(folder, result)
-    from pipeline.study.diagnose_together_page import together_page
+    if page:
+        from pipeline.study.diagnose_together_page import together_page
 
-    together_page(folder, cases, joint, result)
+        together_page(folder, cases, joint, result)

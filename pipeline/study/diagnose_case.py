@@ -177,7 +177,14 @@ class Case:
     band: Band
 
 
-def prepared(bundle: Bundle, folder: Path, engine: str, settings: RunSettings, progress: Progress) -> Case:
+def prepared(
+    bundle: Bundle,
+    folder: Path,
+    engine: str,
+    settings: RunSettings,
+    progress: Progress,
+    executor: Executor | None = None,
+) -> Case:
     """Correlate a bundle's images where it has some, build its model, find its crack.
 
     Parameters
@@ -187,6 +194,7 @@ def prepared(bundle: Bundle, folder: Path, engine: str, settings: RunSettings, p
     engine : str
     settings : RunSettings
     progress : Progress
+    executor : Executor or None; None: every simulation in a process of its own
     """
     if bundle.images:
         found = measured_fields(bundle, folder / DIC_FOLDER, settings, progress)
@@ -195,7 +203,7 @@ def prepared(bundle: Bundle, folder: Path, engine: str, settings: RunSettings, p
     store = SimulationStore(prepare_output(folder / "simulations"))
     simulator = Simulator(
         model, look.observation.sight.points, look.abscissae, None, engine_of(engine), store, settings.accuracy,
-        settings.workers, progress,
+        settings.workers, progress, executor=executor,
     )  # fmt: skip
     band = band_of(look, simulator, start_parameters(bundle))
     look = replace(look, observation=beside(look.observation, band.path))

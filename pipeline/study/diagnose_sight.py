@@ -203,7 +203,12 @@ def clear_of(points: np.ndarray, path: np.ndarray) -> np.ndarray:
 def abscissae(stations: np.ndarray, curve: LoadCurve) -> Abscissae:
     """CMOD values at which simulations are kept: dense about the peak, a little beyond the last station."""
     peak = stations[0] if np.isnan(curve.load).any() else curve.peak()[0]
-    end = BEYOND * stations[-1]
+    return abscissae_about(float(peak), float(stations[-1]))
+
+
+def abscissae_about(peak: float, last: float) -> Abscissae:
+    """The same from the CMOD (m) at the peak and at the last station."""
+    end = BEYOND * last
     early = peak * np.array([0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6])
     late = np.linspace(2.1 * peak, end, 12)
     load = np.concatenate([np.linspace(peak / 20, 2 * peak, 60), np.linspace(2 * peak, end, 101)[1:]])

@@ -79,7 +79,9 @@ def dic(
     return "\n".join([summary(found.result), *found.result["warnings"]])
 
 
-def measured_fields(bundle: Bundle, folder: Path, settings: RunSettings, progress: Progress) -> Measured:
+def measured_fields(
+    bundle: Bundle, folder: Path, settings: RunSettings, progress: Progress, page: bool = True
+) -> Measured:
     """The fields of a bundle's images, from a folder where they lie already, else correlated into it.
 
     Parameters
@@ -88,10 +90,11 @@ def measured_fields(bundle: Bundle, folder: Path, settings: RunSettings, progres
     folder : Path; of the results
     settings : RunSettings
     progress : Progress
+    page : bool; whether figures and report.html are made
     """
     series = correlate_series(bundle, prepare_output(folder), correlation_settings(bundle, settings), progress)
     key = measurement_key(bundle, series)
-    known = _finished(folder, key)
+    known = _finished(folder, key, page)
     if known is not None:
         return Measured(folder / FIELDS, known)
     progress.stage("crack, clock and noise")
@@ -99,8 +102,9 @@ def measured_fields(bundle: Bundle, folder: Path, settings: RunSettings, progres
     write_measured_fields(folder / FIELDS, found)
     result = dic_result(bundle, found, key)
     write_arrays(folder, DIC, dic_arrays(found))
-    progress.stage("drawing")
-    dic_page(folder, bundle, found, result)
+    if page:
+        progress.stage("drawing")
+        dic_page(folder, bundle, found, result)
     write_result(folder, result)  # last: it says that all of this is whole
     return Measured(folder / FIELDS, result)
 
@@ -110,11 +114,11 @@ def with_measured_fields(bundle: Bundle, found: Measured) -> Bundle:
     return replace(bundle, sources=replace(bundle.sources, fields=found.fields, images=(), frames=None))
 
 
-def _finished(folder: Path, key: str) -> dict[str, Any] | None:
+def _finished(folder: Path, key: str, page: bool) -> dict[str, Any] | None:
     """What result.json says, where it and the files beside it are whole and of these images."""
     with contextlib.suppress(MissingFileError, StoreError):
         result = read_result(folder)
-        drawn = (folder / "report.html").is_file()
+        drawn = not page or (folder / "report.html").is_file()
         if result.get("key") == key and drawn and not field_problems(folder / FIELDS):
             read_arrays(folder, DIC)
             return result
