@@ -13,7 +13,7 @@ from pipeline.terminal import Display, exit_codes, finish
 
 blind_check = typer.Typer(no_args_is_help=True, help="The sealed test of diagnose: make, run, open.")
 
-Size = Annotated[Literal["small", "full"], option("--size", help="small: minutes; full: hours.")]
+Size = Annotated[Literal["small", "full"], option("--size", help="small: minutes; full: an hour or more.")]
 Limits = Annotated[
     Path | None, option("--limits", metavar="FILE", help="result.json of a diagnosis: detection limits to scale by.")
 ]
@@ -21,13 +21,21 @@ Truth = Annotated[Path | None, option("--truth", metavar="FILE", help="Truth tab
 
 
 @blind_check.command()
-def make(out: Out, size: Size = "small", limits: Limits = None, seed: Seed = None, debug: Debug = False) -> None:
+def make(
+    out: Out,
+    size: Size = "small",
+    limits: Limits = None,
+    workers: Workers = None,
+    seed: Seed = None,
+    debug: Debug = False,
+) -> None:
     """Break tests with another engine and seal them, their truth locked beside OUT."""
     with exit_codes(debug):
         with Display() as progress:
             from pipeline.study.blind_check.make import make as seal
 
-            summary = seal(out, size=size, seed=seed or 0, limits=limits, progress=progress)
+            cores = workers or os.cpu_count() or 1
+            summary = seal(out, size=size, seed=seed or 0, limits=limits, workers=cores, progress=progress)
         finish(summary, out)
 
 

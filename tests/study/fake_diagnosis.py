@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,6 +22,9 @@ def diagnose(
             Path(hint["open"]).read_bytes()
         if "write" in hint:
             Path(hint["write"]).write_bytes(b"x")
+        if "sleep" in hint and not (check / "woken").exists():
+            (check / "woken").touch()
+            time.sleep(hint["sleep"])
         if "wait_for" in hint and not (check / hint["wait_for"]).exists():
             raise RuntimeError("it was stopped")
         result = {"verdict": "cause", "named": [hint["says"]], "probability": {hint["says"]: 0.9, "none": 0.1},

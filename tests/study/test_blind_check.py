@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.core.errors import ConvergenceError, InputError, StoreError
-from pipeline.gap.effects import library
 from pipeline.store.bundle import read_bundle
 from pipeline.study.blind_check import cases as drawing
 from pipeline.study.blind_check import make as making
+from pipeline.study.blind_check import specimens as breaking
 from pipeline.study.blind_check.guard import Guard
 from pipeline.study.blind_check.opening import open_check
 from pipeline.study.blind_check.run import replicates, run
-from pipeline.study.blind_check.score import calibration, closure_ratio, design_effect, paired, scores, wilson
-from pipeline.study.blind_check.seal import SEAL, VERDICTS, lock, salted, unlock, vault_of, write_seal
+from pipeline.study.blind_check.seal import SEAL, VERDICTS, file_digests, lock, salted, unlock, vault_of, write_seal
 
 FAKE = "study.fake_diagnosis:diagnose"
-EFFECTS = sorted(library())
 
 
 def row(effect: str | None = None, specimen: str = "a", kind: str | None = None, **more: object) -> dict:
@@ -30,15 +34,6 @@ def row(effect: str | None = None, specimen: str = "a", kind: str | None = None,
     return {
         "specimen": specimen, "kind": kind or ("effect" if effect else "none"), "effects": effects,
         "f_max_n": 100.0, "delta_max_m": 1e-4, "multiple": 2.0, **more,
-    }  # fmt: skip
-
-
-def said(label: str, p: float = 0.9, verdict: str | None = None, **more: object) -> dict:
-    rest = {"none": 1 - p} if label != "none" else {"creep": 1 - p}
-    return {
-        "verdict": verdict or ("none needed" if label == "none" else "cause"),
-        "named": [] if label == "none" else label.split(" + "),
-        "probability": {label: p, **rest}, "set_90": [label], "equivalence_classes": [], **more,
     }  # fmt: skip
 
 
@@ -201,106 +196,21 @@ def test_the_kernel_saw_no_path_outside_opened(sealed):
         assert guard.allowed(real, any(w in line for w in ("O_WRONLY", "O_RDWR", "O_CREAT"))), line
 
 
-def test_wilsons_interval():
-    # by hand for 7 of 10: (0.7 + 0.19207)/1.38415 ± 1.95996/1.38415 · √(0.021 + 0.0096036)
-    assert wilson(7, 10) == pytest.approx((0.39678, 0.89221), abs=2e-5)  # rounded by hand
-    assert wilson(0, 0) == (0.0, 1.0)
-
-
-def test_cases_of_one_specimen_count_less():
-    hits = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    assert design_effect(hits, np.array(list("aaabbb"))) == pytest.approx(3.0)  # ρ = 1: two clusters, not six cases
-    assert design_effect(hits, np.array(list("abcdef"))) == 1.0
-
-
-def test_scores_against_a_hand_count():
-    truth = {
-        "1": row("modulus"), "2": row("creep"), "3": row("load_gain"), "4": row(None), "5": row(None),
-        "6": row("creep", kind="outside"), "7": row("modulus", specimen="b"),
-    }  # fmt: skip
-    verdicts = {
-        "1": said("modulus", 0.9), "2": said("modulus", 0.6, equivalence_classes=[["creep", "modulus"]]),
-        "3": said("load_gain", 0.8), "4": said("none", 0.7), "5": said("creep", 0.95),
-        "6": said("modulus", 0.9, verdict="outside the library", named=[]),
-    }  # fmt: skip
-    found = scores(truth, verdicts)
-    assert found["cases"] == 7
-    assert found["failed"] == 1
-    assert found["top1"]["value"] == 2 / 4
-    assert found["class_top1"]["value"] == 3 / 4
-    assert found["false_alarm"]["value"] == 1 / 2
-    assert found["outside_recall"]["value"] == 1.0
-    assert found["coverage_90"]["value"] == 3 / 6
-    assert found["confusion"]["creep"] == {"modulus": 1}
-    assert [m["case"] for m in found["misses"]] == ["2", "5", "7"]
-    # bins by hand: 0.9 → 1 of 2 right (0.9, 0.95), 0.6 → 0 of 1, 0.8 → 1 of 1, 0.7 → 1 of 1, 0.0 → 0 of 1
-    assert found["ece"]["value"] == pytest.approx((2 * abs(0.925 - 0.5) + 0.6 + 0.2 + 0.3 + 0.0) / 6)
-
-
-def test_closure_is_compared_where_the_truth_closes_anything():
-    def ratio(said_there: float | None, true_there: float | None) -> float | None:
-        closed = {"creep": {"fraction": said_there}, "modulus": {"fraction": true_there}}
-        [case] = paired({"1": row("modulus")}, {"1": said("creep", closure=closed)})
-        return closure_ratio(case)
-
-    assert ratio(0.6, 0.8) == pytest.approx(0.75)
-    assert [ratio(0.6, None), ratio(None, 0.8), ratio(0.6, 0.0), ratio(0.6, -0.2)] == [None] * 4
-
-
-def test_calibration_of_what_is_always_right():
-    every = paired({"1": row("modulus"), "2": row("creep")}, {"1": said("modulus", 1.0), "2": said("creep", 1.0)})
-    assert calibration(every)[0] == pytest.approx(0.0)
-
-
-def test_against_shuffled_truth_a_right_diagnosis_is_at_chance():
-    labels = [name for name in EFFECTS for _ in range(10)]
-    verdicts = {str(k): said(name) for k, name in enumerate(labels)}
-    right = scores({str(k): row(n, str(k)) for k, n in enumerate(labels)}, verdicts)
-    shuffled = np.random.default_rng(0).permutation(labels).tolist()
-    wrong = scores({str(k): row(n, str(k)) for k, n in enumerate(shuffled)}, verdicts)
-    assert right["top1"]["value"] == 1.0
-    low, high = wrong["top1"]["interval_95"]
-    assert low <= 1 / len(EFFECTS) <= high
-    assert wrong["top1"]["value"] < 0.12  # chance is 0.05; four standard deviations of 200 cases
-    chance = right["baselines"]["shuffled_truth"]["top1"]
-    assert chance["value"] == pytest.approx(1 / len(EFFECTS), abs=0.005)  # mean of 1000 orders: ± 0.015/√1000
-    assert chance["interval_95"][0] <= wrong["top1"]["value"] <= chance["interval_95"][1]
-    assert right["top1"]["value"] > 5 * chance["interval_95"][1]
-
-
-def test_the_cases_of_a_full_check():
-    limits = drawing.limits_of(None)
-    found = drawing.drawn_cases("full", limits, np.random.default_rng(0))
-    assert sum(c.images for c in found) * 5 >= len(found)
-    for name in EFFECTS:
-        size = library()[name].magnitude
-        mine = [c for c in found if c.kind == "effect" and list(c.effects) == [name]]
-        assert len(mine) == 7 + 4  # four multiples at two noise levels, one of these on four specimens
-        kinds = {(round(c.multiple, 6), c.noise) for c in mine}
-        assert len(kinds) == 8 or min(4 * limits[name], size.high) < 4 * limits[name]  # fewer where the cap is met
-        assert all(size.low <= c.effects[name] <= size.high for c in mine)
-        assert sum(c.kind == "outside" and name in c.effects and name in c.without for c in found) == 1
-    assert all(not set(c.effects) & set(c.without) for c in found if c.kind != "outside")
-    assert sum(c.kind == "none" and bool(c.without) for c in found) > 0  # a short library betrays nothing
-    assert sum(c.kind == "none" for c in found) >= 20
-    assert sum(c.stranger is not None for c in found) >= 10
-
-
 def test_a_test_that_cannot_be_followed_is_broken_on_another_mesh(monkeypatch):
     tried = []
-    monkeypatch.setattr(making, "setup_of", lambda sample, rng: tried.append(rng.integers(2**32)) or len(tried))
+    monkeypatch.setattr(breaking, "setup_of", lambda sample, rng: tried.append(rng.integers(2**32)) or len(tried))
 
     def follow(setup, cmod_max):
         if setup < 3:
             raise ConvergenceError("it snaps back")
         return "path"
 
-    monkeypatch.setattr(making, "break_triangles", follow)
-    assert making.broken_on_some_mesh(None, [1, 7, 0], 1e-3) == (3, "path")
+    monkeypatch.setattr(breaking, "break_triangles", follow)
+    assert breaking.broken_on_some_mesh(None, [1, 7, 0], 1e-3) == (3, "path")
     assert len(set(tried)) == 3  # every mesh is another
-    monkeypatch.setattr(making, "break_triangles", lambda *_: follow(0, 0))
+    monkeypatch.setattr(breaking, "break_triangles", lambda *_: follow(0, 0))
     with pytest.raises(ConvergenceError, match="snaps back"):
-        making.broken_on_some_mesh(None, [1, 7, 0], 1e-3)
+        breaking.broken_on_some_mesh(None, [1, 7, 0], 1e-3)
 
 
 def test_a_check_goes_on_only_as_it_was_begun(tmp_path, monkeypatch):
@@ -316,27 +226,37 @@ def test_a_check_goes_on_only_as_it_was_begun(tmp_path, monkeypatch):
     assert not list((tmp_path / "check").rglob("begun.json"))  # the seed lies in the vault
 
 
-def test_the_small_check_has_twelve_cases():
-    found = drawing.drawn_cases("small", drawing.limits_of(None), np.random.default_rng(1))
-    assert len(found) == 12
-    assert sum(c.images for c in found) == 3
-    assert {c.kind for c in found} == {"none", "effect", "pair", "outside"}
+def test_a_killed_run_goes_on(sealed):
+    hint(sealed, "case-1", sleep=120.0)
+    process = started(f"from pipeline.study.blind_check.run import run; run(Path({str(sealed)!r}), diagnose={FAKE!r})")
+    wait_until((sealed / "woken").exists)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (sealed / VERDICTS).exists()
+    assert "3 verdicts sealed" in run(sealed, diagnose=FAKE)
+    calls = [line.split()[0] for line in (sealed / "calls.txt").read_text().splitlines()]
+    assert calls == ["case-0", "case-1", "case-1", "case-2"]  # what was finished is not repeated
 
 
-def test_detection_limits_of_a_diagnosis_scale_the_effects(tmp_path):
-    file = tmp_path / "result.json"
-    file.write_text(json.dumps({"detection_limit": {"load_gain": {"value": 0.01}, "creep": {"value": None}}}))
-    limits = drawing.limits_of(file)
-    assert limits["load_gain"] == 0.01
-    assert limits["creep"] == drawing.limits_of(None)["creep"]
-    assert drawing.sized("load_gain", 4.0, limits, -1.0) == pytest.approx((-0.04, 4.0))
-    assert drawing.sized("load_gain", 40.0, limits, 1.0) == pytest.approx((0.15, 15.0))  # capped
+def started(program: str) -> subprocess.Popen[bytes]:
+    """A process with everything that it starts in one group."""
+    root = Path(__file__).resolve().parents[2]
+    paths = os.pathsep.join(map(str, [root, root / "tests", *filter(None, [os.environ.get("PYTHONPATH")])]))
+    command = [sys.executable, "-c", f"from pathlib import Path; {program}"]
+    return subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, start_new_session=True)
+
+
+def wait_until(there: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.02)
 
 
 @pytest.mark.slow
 def test_engine_cs_tests_are_ordinary_bundles(tmp_path, monkeypatch):
     """Made coarse: two cases, one of images, sealed; the truth opens again and fits its seal."""
-    coarse = drawing.Size(2.0, 5.0, ("seb",), 6, 6, 0.2, {"seb": 0.12, "dct": 0.12})
+    coarse = drawing.Size(2.0, 5.0, ("seb",), 6, 6, 0.2, 6, {"seb": 0.12, "dct": 0.12})
     monkeypatch.setitem(drawing.SIZES, "small", coarse)
     monkeypatch.setattr(making, "SIZES", drawing.SIZES)
     cases = [
@@ -362,6 +282,30 @@ def test_engine_cs_tests_are_ordinary_bundles(tmp_path, monkeypatch):
     assert truth["cases"]["case-0001"]["effects"] == {"magnification": 0.001}
     with pytest.raises(InputError, match="sealed already"):
         making.make(out, seed=5)
+
+
+@pytest.mark.slow
+def test_a_killed_make_goes_on_to_the_same_bundles(tmp_path, monkeypatch):
+    """Killed between its specimens, then taken up again: bytes are those of a make that nobody stopped."""
+    monkeypatch.setitem(drawing.SIZES, "small", drawing.Size(2.0, 5.0, ("seb",), 6, 6, 0.2, 6, {"seb": 0.12}))
+    effects = [{}, {"modulus": 0.3}, {"air_voids": 0.1}, {"load_gain": 0.1}]
+    cases = [drawing.Case(f"case-{k}", 0, "seb", e, "effect") for k, e in enumerate(effects)]
+    monkeypatch.setattr(making, "drawn_cases", lambda *_: cases)
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    making.make(whole, seed=4)
+    process = started(
+        "from pipeline.study.blind_check import cases, make; "
+        f"cases.SIZES['small'] = cases.{drawing.SIZES['small']}; "
+        f"of = lambda k, e: cases.Case(f'case-{{k}}', 0, 'seb', e, 'effect'); "
+        f"make.drawn_cases = lambda *_: [of(k, e) for k, e in enumerate({effects})]; "
+        f"make.make(Path({str(killed)!r}), seed=4)"
+    )
+    wait_until(lambda: any(killed.glob("bundles/*/experiment.toml")))
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (killed / SEAL).exists()
+    assert "4 sealed tests" in making.make(killed, seed=4)
+    assert file_digests(killed / "bundles") == file_digests(whole / "bundles")
 
 
 @pytest.mark.slow

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline.core.errors import InputError
 from pipeline.gap.effects import effect, library
 
 MULTIPLES = (0.5, 1.0, 2.0, 4.0)
-LIMIT = 0.5  # of the scale of an effect's prior: its detection limit where none is given
 NOISE = {"low": (0.005, 5.0), "high": (0.02, 15.0)}  # of displacement (px of 0.0439 mm) and load (N)
-ONLY_BEAMS = ("eccentricity_mm",)
 REPLICATES = 4  # specimens of a set that is diagnosed together
 STRANGERS = {"aggregate_modulus": -0.5, "gauge_length": 0.5}  # no library has them; relative change
+HIDDEN = 5.0  # detection limits of an effect that the library lacks
+SHORTENED = 0.2  # of the tests with an effect are judged by a library that lacks others
 DECOYS = 2  # effects that are left out although they are not there, wherever something is left out
 
 
@@ -34,7 +31,7 @@ class Case:
     effects : name → value; of the library
     stranger : (name, value) or None; an effect that no library has
     kind : "none", "effect", "pair" or "outside"
-    multiple : float; of the detection limit, after the cap
+    multiple : float; of the detection limit assumed, after the cap
     noise : key of `NOISE`
     images : bool; speckle images instead of fields
     without : effects that the library of this diagnosis must do without
@@ -66,6 +63,7 @@ class Size:
     frames : int; fields under load, so close that nothing is lost between two of them at the peak
     pictures : int; the same where they are speckle images, which cost more
     camera_mm_per_px : float; of speckle images
+    step_px : int; of the grid of their correlation
     cmod_max_mm : float
     """
 
@@ -75,14 +73,13 @@ class Size:
     frames: int
     pictures: int
     camera_mm_per_px: float
+    step_px: int
     cmod_max_mm: Mapping[str, float] = field(default_factory=lambda: {"seb": 0.55, "dct": 0.6})
 
 
 SIZES = {
-    "small": Size(1.5, 2.0, ("seb", "seb"), 121, 41, 0.09),
-    "full": Size(
-        1.0, 1.5, ("seb",) * 6, 121, 61, 0.0439
-    ),  # geometry and radius of the library of discrepancies that ships
+    "small": Size(1.5, 2.0, ("seb",) * 2, 121, 41, 0.09, 12),
+    "full": Size(1.0, 1.5, ("seb",) * 6, 121, 41, 0.0439, 24),  # geometry and radius of the library that ships
 }
 # small: what each of the twelve cases is, in the order of the library's kinds
 SMALL = (
@@ -92,30 +89,12 @@ SMALL = (
 )  # fmt: skip
 
 
-def limits_of(file: Path | None) -> dict[str, float]:
-    """Detection limit of every effect: of the result.json of a diagnosis, or shares of the priors.
-
-    Raises
-    ------
-    InputError
-        where the file holds none
-    """
-    found = {name: LIMIT * one.magnitude.scale for name, one in library().items()}
-    if file is None:
-        return found
-    try:
-        given = json.loads(Path(file).read_text("utf-8"))["detection_limit"]
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{file} holds no detection limits ({error}): give the result.json of a diagnosis") from error
-    return found | {n: float(row["value"]) for n, row in given.items() if n in found and row["value"]}
-
-
 def sized(name: str, multiple: float, limits: Mapping[str, float], sign: float) -> tuple[float, float]:
     """Value of an effect at a multiple of its limit, capped at the plausible maximum, and the multiple it then is."""
     range_ = effect(name).magnitude
     downwards = sign < 0 and range_.low < 0
     most = -range_.low if downwards else range_.high
-    value = min(multiple * limits[name], most)
+    value = float(f"{min(multiple * limits[name], most):.3g}")  # as a person would put it
     return (-value if downwards else value), value / limits[name]
 
 
@@ -142,18 +121,24 @@ def drawn_cases(size: str, limits: Mapping[str, float], rng: np.random.Generator
 
 
 def _replicates(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Sets of specimens with the same effect at the largest multiple, and one without any; low noise."""
+    """Sets of specimens with the same effect at the largest multiple, and one without any, at low noise; every effect
+    also at high noise on one of them, and once more, larger, where the library lacks it."""
     new: list[dict[str, Any]] = []
     sets = [(), *((name,) for name in library())]
     labels = [f"set-{k:02d}" for k in rng.permutation(len(sets)).tolist()]
     for label, names in zip(labels, sets, strict=True):
-        row = _row(tuple((n, max(MULTIPLES)) for n in names), limits, rng) | {"noise": "low", "replicates": label}
-        new += [row | {"specimen": k} for k in range(REPLICATES)]
+        sign = float(rng.choice([-1.0, 1.0]))
+        row = _row(tuple((n, max(MULTIPLES)) for n in names), limits, sign) | {"noise": "low"}
+        new += [row | {"specimen": k, "replicates": label} for k in range(REPLICATES)]
+        if names:
+            again = {"specimen": int(rng.integers(REPLICATES))}
+            new.append(row | again | {"noise": "high"})
+            new.append(_left_out(_row(tuple((n, HIDDEN) for n in names), limits, sign) | again, True, rng))
     return new
 
 
-def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
-    sizes = {n: sized(n, m, limits, rng.choice([-1.0, 1.0])) for n, m in names}
+def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], sign: float) -> dict[str, Any]:
+    sizes = {n: sized(n, m, limits, sign) for n, m in names}
     kind = ("none", "effect", "pair")[len(names)]
     reached = min((m for _, m in sizes.values()), default=0.0)
     return {"effects": {n: v for n, (v, _) in sizes.items()}, "kind": kind, "multiple": reached}
@@ -167,34 +152,47 @@ def _left_out(row: dict[str, Any], hidden: bool, rng: np.random.Generator) -> di
 
 
 def _small(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
-    rows = [_row(names, limits, rng) for names in SMALL]
-    rows.append(_left_out(_row((("load_gain", 4.0),), limits, rng), True, rng))
+    rows = [_row(names, limits, _sign(rng)) for names in SMALL]
+    rows.append(_left_out(_row((("load_gain", 4.0),), limits, _sign(rng)), True, rng))
     rows[2] = _left_out(rows[2], False, rng)
     return rows
 
 
 def _full(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
     geometries = SIZES["full"].specimens
+    rows = _replicates(limits, rng)
     for name in library():
-        for multiple in MULTIPLES:
-            for noise in NOISE if multiple < max(MULTIPLES) else ("high",):  # at low noise: the replicates
-                allowed = [k for k, g in enumerate(geometries) if g == "seb" or name not in ONLY_BEAMS]
-                row = _row(((name, multiple),), limits, rng) | {"noise": noise, "specimen": int(rng.choice(allowed))}
-                rows.append(_left_out(row, False, rng) if rng.uniform() < 0.2 else row)
-        hidden = _row(((name, 5.0),), limits, rng) | {"specimen": int(rng.choice(allowed))}
-        rows.append(_left_out(hidden, True, rng))
+        rows += _smaller(name, limits, len(geometries), rng)
     for specimen in range(len(geometries)):
         for noise in NOISE:
-            row = _row((), limits, rng) | {"noise": noise, "specimen": specimen}
+            row = _row((), limits, 1.0) | {"noise": noise, "specimen": specimen}
             rows.append(_left_out(dict(row), False, rng))
             if noise != "low" or specimen >= REPLICATES:
                 rows.append(row)
         for name, value in STRANGERS.items():
-            rows.append(_row((), limits, rng) | {"kind": "outside", "stranger": (name, value), "specimen": specimen})
-    rows += _replicates(limits, rng)
-    names = [n for n in library() if n not in ONLY_BEAMS]
-    for _ in range(2 * len(geometries)):
-        pair = tuple((str(n), 4.0) for n in rng.choice(names, 2, replace=False))
-        rows.append(_row(pair, limits, rng))
+            rows.append(_row((), limits, 1.0) | {"kind": "outside", "stranger": (name, value), "specimen": specimen})
+    return rows + [_pair(limits, rng) for _ in range(2 * len(geometries))]
+
+
+def _smaller(name: str, limits: Mapping[str, float], specimens: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """An effect at the smaller multiples, each on one specimen at both noises; sizes that the cap makes alike once."""
+    rows: list[dict[str, Any]] = []
+    known = {sized(name, max(MULTIPLES), limits, sign)[0] for sign in (-1.0, 1.0)}  # of the replicates
+    for multiple in sorted(MULTIPLES)[:-1]:
+        row = _row(((name, multiple),), limits, _sign(rng)) | {"specimen": int(rng.integers(specimens))}
+        if row["effects"][name] in known:
+            continue
+        for noise in NOISE:
+            one = row | {"noise": noise}
+            rows.append(_left_out(one, False, rng) if rng.uniform() < SHORTENED else one)
     return rows
+
+
+def _pair(limits: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
+    """Two effects, each of which could be detected."""
+    names = [n for n in library() if limits[n] <= effect(n).magnitude.high]
+    return _row(tuple((str(n), 4.0) for n in rng.choice(names, 2, replace=False)), limits, _sign(rng))
+
+
+def _sign(rng: np.random.Generator) -> float:
+    return float(rng.choice([-1.0, 1.0]))

@@ -19,7 +19,7 @@ from pipeline.store.bundle import read_bundle
 from pipeline.store.new import Contents, write_bundle
 from pipeline.study.assembly import build_model
 from pipeline.study.blind_check.cases import SIZES
-from pipeline.study.blind_check.make import Drawn, draw, material_of
+from pipeline.study.blind_check.specimens import Drawn, draw, material_of
 
 CMOD_MAX = 0.55 * MM
 AT = (0.1, 0.2, 0.45)  # mm of CMOD, in the tables

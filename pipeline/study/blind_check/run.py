@@ -13,9 +13,11 @@ from typing import Any
 
 from pipeline import __version__
 from pipeline.core.errors import InputError, PipelineError, StoreError
+from pipeline.execution.processes import THREADS
 from pipeline.execution.progress import Progress, Silent
 from pipeline.store.atomic import write_atomically
 from pipeline.store.results import RESULT, plain, prepare_output
+from pipeline.study.blind_check.looks import LOOKS, write_strips
 from pipeline.study.blind_check.seal import (
     BUNDLES,
     OPENED,
@@ -30,9 +32,10 @@ from pipeline.study.blind_check.seal import (
     read_json,
 )
 
-DIAGNOSE = "pipeline.study.diagnose:diagnose"
+DIAGNOSE, LOOK = (f"pipeline.study.blind_check.judging:{name}" for name in ("diagnose", "look"))
 DIAGNOSES, SIMULATIONS, SCRATCH = "diagnoses", "simulations", "scratch"
 LOG, SECONDS = "log.txt", "seconds.json"
+TOGETHER = 4  # bundles that one process looks at
 
 
 def run(
@@ -70,6 +73,8 @@ def run(
     plan = read_json(out / PLAN) if (out / PLAN).exists() else {}
     names = sorted(path.name for path in (out / BUNDLES).iterdir() if path.is_dir())
     sets = replicates(plan, names)
+    if diagnose == DIAGNOSE:
+        _looked_at(out, names, workers, prefix, progress)
     tasks = [*sets.items(), *((name, [name]) for name in names)]
     done = [name for name, _ in tasks if _found(out, name) is not None]
     progress.stage(f"diagnosing {len(names)} sealed bundles" + (f", {len(sets)} sets of replicates" if sets else ""))
@@ -87,6 +92,24 @@ def run(
                 else:
                     progress.failed(name, PipelineError(failure))
     return _sealed(out, names, list(sets))
+
+
+def _looked_at(out: Path, names: Sequence[str], workers: int, prefix: Sequence[str], progress: Progress) -> None:
+    """Find what tests of one specimen share; images are correlated for it. A bundle that fails here shares nothing."""
+    missing = [name for name in names if not (out / LOOKS / f"{name}.json").exists()]
+    progress.stage(f"looking at {len(names)} sealed bundles")
+    progress.begin(len(names), len(names) - len(missing), "bundle")
+
+    def looked(part: Sequence[str]) -> None:
+        folder = prepare_output(out / LOOKS / f"part-{part[0]}")
+        bundles = os.pathsep.join(str(out / BUNDLES / name) for name in part)
+        _guarded(out, [bundles, str(out), "0", "", LOOK], folder, prefix)
+        for name in part:
+            progress.done(name)
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(looked, [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]))
+    write_strips(out, names)
 
 
 def replicates(plan: Mapping[str, Any], names: Sequence[str]) -> dict[str, list[str]]:
@@ -138,20 +161,23 @@ def _diagnosed(
     for member in members if len(members) > 1 else ():
         if not (folder / member).exists():
             (folder / member).symlink_to(_folder(out, member), target_is_directory=True)
-    scratch = str(prepare_output(out / SCRATCH))
     bundles = os.pathsep.join(str(out / BUNDLES / member) for member in members)
-    command = [
-        *prefix, sys.executable, "-m", "pipeline.study.blind_check.guard", str(out), bundles, str(folder), str(seed),
-        ",".join(without), diagnose,
-    ]  # fmt: skip
+    code = _guarded(out, [bundles, str(folder), str(seed), ",".join(without), diagnose], folder, prefix)
+    if code == 0 and (folder / RESULT).exists():
+        return None
+    return _last_line(folder / LOG) or f"the process ended with {code} and no result"
+
+
+def _guarded(out: Path, asked: Sequence[str], folder: Path, prefix: Sequence[str]) -> int:
+    """Run the guard in a process of its own, its words and seconds into a folder; returns its code."""
+    scratch = str(prepare_output(out / SCRATCH))
+    command = [*prefix, sys.executable, "-m", "pipeline.study.blind_check.guard", str(out), *asked]
     root = str(Path(__file__).resolve().parents[3])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     settings = {"TMPDIR": scratch, "MPLCONFIGDIR": scratch, "HOME": scratch, "PYTHONPATH": paths, "MPLBACKEND": "Agg"}
     settings["PYTHONDONTWRITEBYTECODE"] = "1"
-    code = _timed(command, out, os.environ | settings, folder)
-    if code == 0 and (folder / RESULT).exists():
-        return None
-    return _last_line(folder / LOG) or f"the process ended with {code} and no result"
+    settings |= dict.fromkeys(THREADS, "1")  # as many diagnoses at a time as there are workers
+    return _timed(command, out, os.environ | settings, folder)
 
 
 def _timed(command: Sequence[str], out: Path, settings: Mapping[str, str], folder: Path) -> int:

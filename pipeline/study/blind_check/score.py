@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.gap.effects import library
+from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED
 from pipeline.gap.score import NONE
 
 SURE, VISIBLE, OUTSIDE = 0.8, 5.0, "outside the library"
 Z = 1.959964  # of 95 %
 BINS = 10
+STEPS = (0.5, 1.0, 2.0, 4.0)  # detection limits between which cases are counted together
+STEP_NAMES = ("below 0.5", "0.5 to 1", "1 to 2", "2 to 4", "4 and more")
+FAR_OUTSIDE = 4.95  # detection limits: those asked for are 5, to three digits
 
 
 @dataclass(frozen=True)
@@ -59,14 +62,28 @@ class Scored:
         return self.truth in [label_of(entry.split(" + ")) for entry in self.result.get("set_90", [])]
 
     @property
-    def d_prime(self) -> float:
-        """d′ of the true value: in proportion to the detection limit that the diagnosis states."""
-        limits = self.result.get("detection_limit", {})
-        found = []
+    def multiple(self) -> float:
+        """The true value in detection limits of the diagnosis's own card, of the smallest where there are several.
+
+        Where no plausible size is detected d′ counts, in proportion to the value; where the card lacks the effect, what
+        the truth table says.
+        """
+        limits, found = self.result.get("detection_limit", {}), []
         for name, value in self.row.get("effects", {}).items():
-            limit = (limits.get(name) or {}).get("value")
-            found.append(DETECTED * abs(value) / limit if limit else 0.0)
+            row = limits.get(name)
+            if row is None:
+                found.append(float(self.row["multiple"]))
+            elif row.get("value"):
+                found.append(abs(value) / row["value"])
+            else:
+                found.append(row.get("d_prime_at_most", 0.0) / DETECTED * abs(value) / effect(name).magnitude.high)
         return min(found, default=0.0)
+
+    @property
+    def d_prime(self) -> float:
+        """d′ of the true value, by the diagnosis's own card; 0 where it could not judge the effect."""
+        judged = set(self.row.get("effects", {})) <= set(self.result.get("detection_limit", {}))
+        return DETECTED * self.multiple if judged else 0.0
 
 
 def label_of(names: Sequence[str]) -> str:
@@ -256,7 +273,8 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
     inside = single + free
     visible = [c for c in single if c.d_prime >= VISIBLE]
     kinds = {n: e.kind for n, e in library().items()}
-    clear = [c for c in single if kinds.get(c.truth) == "measurement" and c.row["multiple"] >= 2]
+    clear = [c for c in single if kinds.get(c.truth) == "measurement" and c.multiple >= 2]
+    clear_outside = [c for c in outside if not c.row.get("effects") or c.multiple >= FAR_OUTSIDE]
     physics = [c for c in visible if kinds.get(c.truth) == "physics"]
     ece, bins = calibration(inside)
     ratios = [r for r in (closure_ratio(c) for c in visible) if r is not None]
@@ -274,6 +292,7 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
         "ece": {"value": ece, "interval_95": _ece_interval(inside), "cases": len(inside)},
         "reliability": bins,
         "outside_recall": share(outside, lambda c: c.top == "outside"),
+        "outside_recall_at_5_limits": share(clear_outside, lambda c: c.top == "outside"),
         "confident_wrong_outside": share(outside, named_surely),
         "pairs_top1": share(pairs, lambda c: c.right),
         "pairs_one_named": share(pairs, lambda c: bool(set(c.top.split(" + ")) & set(c.truth.split(" + ")))),
@@ -301,11 +320,19 @@ def bias(cases: Sequence[Scored]) -> dict[str, Any]:
 
 
 def limits(cases: Sequence[Scored]) -> dict[str, Any]:
-    """Per effect: share named right by multiple of its detection limit."""
+    """Per effect: share named right, by class, and number of cases, by multiple of the card's detection limit."""
     found: dict[str, dict[str, list[float]]] = {}
     for case in cases:
-        found.setdefault(case.truth, {}).setdefault(f"{case.row['multiple']:.3g}", []).append(float(case.right_class))
-    return {n: {m: float(np.mean(v)) for m, v in sorted(rows.items())} for n, rows in sorted(found.items())}
+        found.setdefault(case.truth, {}).setdefault(step_of(case.multiple), []).append(float(case.right_class))
+    return {
+        n: {m: {"right": float(np.mean(rows[m])), "cases": len(rows[m])} for m in STEP_NAMES if m in rows}
+        for n, rows in sorted(found.items())
+    }
+
+
+def step_of(multiple: float) -> str:
+    """Between which multiples a size lies."""
+    return STEP_NAMES[int(np.searchsorted(STEPS, multiple, side="right"))]
 
 
 def _miss(case: Scored) -> dict[str, Any]:
@@ -314,7 +341,7 @@ def _miss(case: Scored) -> dict[str, Any]:
         "truth": case.truth,
         "kind": case.kind,
         "effects": dict(case.row.get("effects", {})),
-        "multiple": case.row.get("multiple"),
+        "multiple": case.multiple,
         "said": case.top,
         "verdict": case.result.get("verdict", "failed"),
         "probability": case.probability,
