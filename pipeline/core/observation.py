@@ -40,6 +40,7 @@ def observe(
     points: np.ndarray,
     open_at: np.ndarray,
     reach: float | None = None,
+    joined_as_in: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacements of material points, each from the particles still joined on its own crack flank.
 
@@ -56,6 +57,7 @@ def observe(
     points : (p, 2) array, m; reference positions
     open_at : (m,) array, m; change of length from which a bond no longer joins, a fraction of its delta_max
     reach : float, m; three particle spacings where not given
+    joined_as_in : (frames, n, 2) array, m; fields that tell which bonds are cut, `displacement` where not given
 
     Returns
     -------
@@ -68,8 +70,9 @@ def observe(
     near = _neighbourhoods(particles, bonds, np.asarray(points, float), reach)
     values = np.full((len(displacement), len(points), 2), np.nan)
     joined, weight, carried = None, np.zeros(near.index.shape), np.zeros(len(points), bool)
-    for frame, field in zip(values, displacement, strict=True):
-        whole = np.abs(_elongation(particles.position, near.pairs, field)) <= open_at[near.used]
+    telling = displacement if joined_as_in is None else joined_as_in
+    for frame, field, parting in zip(values, displacement, telling, strict=True):
+        whole = np.abs(_elongation(particles.position, near.pairs, parting)) <= open_at[near.used]
         before, joined = joined, _joined(near, whole)
         changed = np.ones(len(points), bool) if before is None else np.any(joined != before, axis=1)
         for point in np.flatnonzero(changed).tolist():

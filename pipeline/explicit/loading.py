@@ -6,8 +6,9 @@ the error of the load is of second order in the rate (measured). Two numbers fol
 - the *highest rate*: at 1 % the undamaged specimen would be opened to the end of the test within
   `PERIODS` periods of its lowest mode; for other accuracies the rate goes with their square root;
 - the *lag wanted*: fix cohesive/drive measures which share of the machine's power, at peak load, goes into
-  motion and drag, and slows down where the share exceeds `LAG` times the accuracy. The error of the load is
-  about 1.5 times, at most twice, the lag.
+  motion and drag. Over the way of the machine that is a force by which the load is off; the rule keeps its root
+  mean square over CMOD below `LAG` times the accuracy times that of the load. The error of the load at single
+  stations is once to 1/`LAG` times that (measured).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pipeline.core.problem import Problem, SlidingLaw
 from pipeline.explicit.modes import Modes
 
 PERIODS = 40
-LAG = 0.5
+LAG = 1 / 2.25
 SLOWEST = 1 / 300  # of the highest rate; below it a run would not end
 LONGEST = 4000  # periods of the lowest mode until a run is given up
 RECORD = 20  # steps between two records, a fiftieth of a period or less
@@ -33,7 +34,7 @@ class Loading:
     Parameters
     ----------
     first_rate, lowest_rate, highest_rate : float, m per step; speed of the machine
-    lag : float; share of the machine's power at peak load that may go into motion and drag
+    lag : float; share of the root mean square load that may go into motion and drag
     first_load : float, N; load at first damage, stands for the peak load before it is known
     record : int; steps between two records
     steps_max : int; the run is given up after these

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 HASTE = 10.0  # how much faster the rate falls than it rises
-ERROR_PER_LAG = 2.0  # the load is off by up to about twice the lag (measured against the equilibrium engine)
+ERROR_PER_EXCESS = 2.25  # error of the load over the rms excess, at most (measured against the equilibrium engine)
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,9 @@ class Drive:
     peak : float, N; largest load so far, the load at first damage before that is exceeded
     spent : float, J; kinetic energy and damping at the last record
     lag : float; share of the machine's power, at peak load, that goes into motion and drag
-    lag_squares : float, m; ∫ lag² dCMOD
+    excess : float, N; by how much that puts the load off, over the CMOD of the test
+    excess_squares, load_squares : float, N² m; ∫ excess² dCMOD, ∫ P² dCMOD
+    opened : float, m; largest CMOD of a record
     cmod : float, m; at the last record
     """
 
@@ -42,24 +44,52 @@ class Drive:
     peak: float
     spent: float
     lag: float = 0.0
-    lag_squares: float = 0.0
+    excess: float = 0.0
+    excess_squares: float = 0.0
+    load_squares: float = 0.0
+    opened: float = 0.0
     cmod: float = 0.0
 
     @property
     def error(self) -> float:
-        """Error of the load over the test so far: twice the root mean square of the lag over CMOD."""
-        return ERROR_PER_LAG * float(np.sqrt(max(self.lag_squares, 0.0) / self.cmod)) if self.cmod > 0 else 0.0
+        """Error of the load over the test so far, from the root mean squares of the excess and of the load."""
+        return ERROR_PER_EXCESS * float(np.sqrt(self.excess_squares / self.load_squares)) if self.load_squares else 0.0
 
-    def measure(self, energy: Energies, cmod: float, load: float, steps: int, share: float) -> Drive:
+    def allowed(self, wanted: float) -> float:
+        """What the lag should be now: the share `wanted` is of the root mean square of the load over CMOD.
+
+        That of a load in proportion before there is one. Where more was spent already less is left, down to a half.
+        """
+        if not self.load_squares:
+            return wanted / float(np.sqrt(3))
+        mean = float(np.sqrt(self.load_squares / self.opened)) / self.peak
+        spent = float(np.sqrt(self.excess_squares / self.load_squares)) / wanted
+        return wanted * min(mean, 1.0) / float(np.clip(spent, 1, 2))
+
+    def measure(self, energy: Energies, cmod: float, load: float, line: float, steps: int, share: float) -> Drive:
         """The lag over the last `steps`, `share` of a period: it rises at once and fades over a period.
 
-        lag = Δ(E_kin + E_damp) / (P_peak × rate × steps)
+        lag = Δ(E_kin + E_damp) / (P_peak × way), way = rate × steps, and the excess Δ(E_kin + E_damp) / way, in which
+        the way counts as no shorter than so much opening took so far: where the crack jumps the machine (at `line`, m)
+        stands still. Where the mouth swings back nothing is added.
         """
         peak, spent = max(self.peak, load), energy.kinetic + energy.damping
-        now = abs(spent - self.spent) / (peak * self.rate * steps)
-        lag = max(now, self.lag * (1 - min(1.0, share)))
-        squares = self.lag_squares + lag**2 * (cmod - self.cmod)
-        return replace(self, peak=peak, spent=spent, lag=lag, lag_squares=squares, cmod=cmod)
+        now, way, keep = abs(spent - self.spent), self.rate * steps, 1 - min(1.0, share)
+        opened = max(cmod - self.opened, 0.0)
+        excess = self.excess * keep
+        if opened > 0 and cmod > 0:
+            excess = max(now / max(way, opened * line / cmod), excess)
+        return replace(
+            self,
+            peak=peak,
+            spent=spent,
+            lag=max(now / (peak * way), self.lag * keep),
+            excess=excess,
+            excess_squares=self.excess_squares + excess**2 * opened,
+            load_squares=self.load_squares + load**2 * opened,
+            opened=self.opened + opened,
+            cmod=cmod,
+        )
 
     def factor(self, wanted: float, share: float, lowest: float, highest: float) -> float:
         """By how much to change the rate: by the root of wanted over measured lag, down ten times as fast as up."""

@@ -106,7 +106,8 @@ class Run:
         platen, support = self.window.drive / n, self.window.react / n
         means = {"cmod_m": self.window.gauge / n - self.zero, "load_n": (platen + support) / 2}
         means |= {"load_line_m": self.window.load_line / n, "drive_n": platen, "react_n": support}
-        self.drive = self.drive.measure(self.energy, means["cmod_m"], means["load_n"], n, self.share)
+        at = means["cmod_m"], means["load_n"], means["load_line_m"]
+        self.drive = self.drive.measure(self.energy, *at, n, self.share)
         self._choose_rate()
         self._note(means)
         self.window = Window()
@@ -117,7 +118,7 @@ class Run:
 
     def _choose_rate(self) -> None:
         """Change the speed of machine and particles alike; kinetic energy that this takes out is damping."""
-        lag, low, high = self.loading.lag, self.loading.lowest_rate, self.loading.highest_rate
+        lag, low, high = self.drive.allowed(self.loading.lag), self.loading.lowest_rate, self.loading.highest_rate
         factor = self.drive.factor(lag, self.share, low, high)
         self.state, self.drive = self.state.scaled(factor), replace(self.drive, rate=factor * self.drive.rate)
         kept = factor**2 * self.energy.kinetic

@@ -4,45 +4,51 @@ from __future__ import annotations
 
 import resource
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from pipeline.core.problem import Kinematics, Solution
 from pipeline.equilibrium import solve as equilibrium
 from pipeline.lmp import simulate as lammps
-from pipeline.study.agreement import curve_difference, field_difference, peak_difference
-from pipeline.study.observation import observe_solution
+from pipeline.study.agreement import peak_difference
+from pipeline.study.engines import FORWARD, REFINED, Engine, engine
+from pipeline.study.paths import apart, nearest_path
 from pipeline.study.specimens import Trial, section_trial
 
 TIGHTER = 0.1  # of the tolerance, in the runs that the engine is judged by
 
 
-def apart(trial: Trial, solution: Solution, limit: Solution) -> tuple[float, float]:
-    """Differences of curve and field, relative."""
-    seen = [observe_solution(trial.problem, s, trial.points) for s in (solution, limit)]
-    return curve_difference(solution.curve, limit.curve, trial.problem.stations), field_difference(*seen)
-
-
 def engine_rows(trials: Sequence[Trial], accuracies: Sequence[float]) -> Iterator[str]:
-    """LAMMPS against equilibrium at equal kinematics, a line a run, as soon as it is finished.
+    """LAMMPS against refined equilibria at equal kinematics, a line a run, as soon as it is finished.
 
-    Where the crack jumps, against the equilibrium under a machine that only moves forward, too.
+    Where the crack jumps, against equilibria under a machine that only moves forward; how far it is from those under
+    CMOD control is the last column.
     """
-    yield "| specimen | asked | steps | seconds | load | field | peak | own estimate | equilibrium | machine forward |"
+    yield "| specimen | asked | steps | seconds | load | field | peak | own estimate | path | CMOD control |"
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for trial in trials:
-        limit = equilibrium.solve(trial.problem)
-        jumps = "jumped" in limit.message
-        forward = equilibrium.solve(trial.problem, snap_back=False) if jumps else None
+        turning = engine(REFINED).solve(trial.problem)
+        jumps = "jumped" in turning.message
+        limits: dict[str, Solution] = {} if jumps else {trial.name: turning}
+        solve = partial(_kept, limits, engine(FORWARD if jumps else REFINED))
         for accuracy in accuracies:
             run = lammps.solve(trial.with_accuracy(accuracy).problem)
-            curve, field = apart(trial, run, limit)
-            behind = "" if forward is None else "load {:.2%}, field {:.2%}".format(*apart(trial, run, forward))
+            near = nearest_path(trial, run, accuracy, solve)
+            path = "jumps" if jumps else "" if near.path == 0 else f"strengths {near.path}"
+            back = "load {:.2%}, field {:.2%}".format(*apart(trial, run, turning)) if jumps else ""
             yield (
-                f"| {trial.name} | {accuracy:.1%} | {run.steps} | {run.seconds:.1f} | {curve:.2%} | {field:.2%} | "
-                f"{peak_difference(run, limit):+.2%} | {run.quasi_static_error:.2%} | {limit.seconds:.1f} s | "
-                f"{behind} |"
+                f"| {trial.name} | {accuracy:.1%} | {run.steps} | {run.seconds:.1f} | {near.curve:.2%} | "
+                f"{near.field:.2%} | {peak_difference(run, near.limit):+.2%} | {run.quasi_static_error:.2%} | "
+                f"{path} | {back} |"
             )
+
+
+def _kept(limits: dict[str, Solution], reference: Engine, trial: Trial) -> Solution:
+    """The solution of a trial by the reference, solved once."""
+    if trial.name not in limits:
+        limits[trial.name] = reference.solve(trial.problem)
+    return limits[trial.name]
 
 
 def tolerance_rows(trials: Sequence[Trial]) -> Iterator[str]:

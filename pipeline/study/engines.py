@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.metadata
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from pipeline import __version__
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import Problem, Solution
 
-FORWARD = "equilibrium, machine forward"  # for the cross-check: jumps where the explicit engines must jump
+REFINED = "equilibrium, refined"  # for the cross-check: much nearer to the limit than what it is to judge
+FORWARD = "equilibrium, machine forward"  # the same, and jumps where the explicit engines must jump
+FINER = 4  # increments of these are shorter
+TIGHTER = 0.1  # of the tolerance
 
 
 @dataclass(frozen=True)
@@ -63,11 +65,8 @@ def engine(name: str, ranks: int = 1) -> Engine:
         from pipeline.equilibrium import solve
 
         return Engine(f"equilibrium to {solve.TOLERANCE:g}, cohesive-bpm {__version__}", solve.solve)
-    if name == FORWARD:
-        from pipeline.equilibrium import solve
-
-        label = f"{FORWARD} to {solve.TOLERANCE:g}, cohesive-bpm {__version__}"
-        return Engine(label, functools.partial(solve.solve, snap_back=False))
+    if name in (REFINED, FORWARD):
+        return _refined(name)
     if name == "reference":
         from pipeline.reference import solve as steps
 
@@ -75,3 +74,15 @@ def engine(name: str, ranks: int = 1) -> Engine:
     raise UnavailableError(
         f"engine {name!r} is not available in version {__version__}: use lammps, equilibrium or reference"
     )
+
+
+def _refined(name: str) -> Engine:
+    """The equilibrium engine with shorter increments and a tighter tolerance."""
+    from pipeline.equilibrium import solve
+    from pipeline.equilibrium.path import Increments
+
+    usual, tolerance = Increments(), TIGHTER * solve.TOLERANCE
+    shorter = replace(usual, far=usual.far / FINER, near=usual.near / FINER, leap=usual.leap / FINER)
+    label = f"{name} to {tolerance:g}, increments 1/{FINER}, cohesive-bpm {__version__}"
+    solver = partial(solve.solve, tolerance=tolerance, increments=shorter, snap_back=name == REFINED)
+    return Engine(label, solver)

@@ -15,10 +15,16 @@ from pipeline.inverse.observations import Measured
 PARTED = 0.1  # of delta_max: a bond opened farther no longer joins two flanks
 
 
-def observe_solution(problem: Problem, solution: Solution, points: np.ndarray) -> np.ndarray:
-    """Displacements (frames, p, 2) in m of material points in the frames of a solution; NaN where invalid."""
+def observe_solution(
+    problem: Problem, solution: Solution, points: np.ndarray, flanks_of: Solution | None = None
+) -> np.ndarray:
+    """Displacements (frames, p, 2) in m of material points in the frames of a solution; NaN where invalid.
+
+    With `flanks_of` over the particles that hang together in that solution, of as many frames: the same material.
+    """
     parted = PARTED * np.where(np.isfinite(problem.law.delta_max), problem.law.delta_max, np.inf)
-    values, _ = observe(problem.particles, problem.bonds, solution.displacement, points, parted)
+    flanks = None if flanks_of is None else flanks_of.displacement
+    values, _ = observe(problem.particles, problem.bonds, solution.displacement, points, parted, None, flanks)
     return values
 
 

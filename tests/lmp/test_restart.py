@@ -19,7 +19,7 @@ from pipeline.lmp.plugin import open_lammps
 from .bonds import LENGTH, SMALL, chain
 
 CENTRAL, SHEAR = "3.7e8 71.0 1.14e-4", "shear 1e8 50 2e-4"
-NOW = 2.0  # format
+NOW, DRIVE = 2.0, 3.0  # formats: of bond_style cohesive, of fix cohesive/drive
 
 
 @pytest.fixture
@@ -140,11 +140,11 @@ def test_a_drive_of_another_format_is_refused(tmp_path: Path, monkeypatch: pytes
     with deck() as lmp:
         lmp.commands_list(["run 50 post no", "write_restart written"])
         rate = told(lmp)[10]
-    now, speed = struct.pack("<d", NOW), struct.pack("<d", rate)
+    now, speed = struct.pack("<d", DRIVE), struct.pack("<d", rate)
     [line] = re.findall(re.escape(now) + b"(.{8})" + re.escape(speed), Path("written").read_bytes(), re.DOTALL)
     stamped(Path("written"), now + line + speed, struct.pack("<d", 0.0) + line + speed).rename("restart.50")
     with (
-        pytest.raises(Exception, match="holds fix cohesive/drive in format 0, this version reads format 2"),
+        pytest.raises(Exception, match="holds fix cohesive/drive in format 0, this version reads format 3"),
         deck(50),
     ):
         pass

@@ -70,9 +70,10 @@ class FixCohesiveDrive : public Fix {
   struct State {
     double load_line, rate, cmod_zero, started;
     double work, damping, lost_before;
-    double peak, lag, error_sum, error_weight;
+    double peak, lag;
+    double excess, error_sum, load_sum, opened;    // N; N² m over CMOD: of the excess, of the load; largest CMOD, m
     double cmod, load, load_line_mean, load_drive, load_react, stored, dissipated, kinetic;
-    double next_frame, frame_due, last_cmod;
+    double next_frame, frame_due;
     double widest, time;    // largest CMOD, and the time at which the test was there
     Window window;
     double damping_now;     // of the steps since the last record, on this rank
@@ -91,6 +92,7 @@ class FixCohesiveDrive : public Fix {
   void find_rotation();
   void record();
   void measure_lag();
+  double lag_allowed() const;
   void choose_rate();
   void mark_frames();
   double kinetic_energy() const;

@@ -15,8 +15,8 @@ using namespace LAMMPS_NS;
 
 // how much faster the rate falls than it rises
 static constexpr double HASTE = 10.0;
-// the load is off by up to about twice the lag (measured against the equilibrium engine)
-static constexpr double ERROR_PER_LAG = 2.0;
+// error of the load over the root mean square of the excess: up to so much (measured against the equilibrium engine)
+static constexpr double ERROR_PER_EXCESS = 2.25;
 
 double FixCohesiveDrive::kinetic_energy() const
 {
@@ -59,19 +59,36 @@ void FixCohesiveDrive::record()
   state.damping_now = 0.0;
 }
 
-// share of the machine's power, at peak load, that goes into motion and drag instead of the specimen
+// What goes into motion and drag instead of the specimen, over the machine's way, is a force that the load is off by.
+// The lag is that force over the peak load. For the error at a CMOD the way counts as no shorter than so much opening
+// took so far, for where the crack jumps the machine stands still; where the mouth swings back nothing is added.
 void FixCohesiveDrive::measure_lag()
 {
-  const double lost = state.kinetic + state.damping;
-  const double power = state.peak * state.rate * nevery * update->dt;
-  const double now = power > 0.0 ? (lost - state.lost_before) / power : 0.0;
+  const double lost = state.kinetic + state.damping, now = std::fabs(lost - state.lost_before);
+  const double way = state.rate * nevery * update->dt;
+  const double opened = std::max(state.cmod - state.opened, 0.0);
   state.lost_before = lost;
   // rises at once, fades over a period
-  const double share = std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
-  state.lag = std::max(std::fabs(now), state.lag * (1.0 - share));
-  state.error_sum += state.lag * state.lag * (state.cmod - state.last_cmod);
-  state.error_weight += state.cmod - state.last_cmod;
-  state.last_cmod = state.cmod;
+  const double keep = 1.0 - std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
+  state.lag = std::max(now / (state.peak * way), state.lag * keep);
+  state.excess *= keep;
+  if (opened > 0.0 && state.cmod > 0.0) {
+    const double usual = opened * state.load_line_mean / state.cmod;
+    state.excess = std::max(now / std::max(way, usual), state.excess);
+  }
+  state.error_sum += state.excess * state.excess * opened;
+  state.load_sum += state.load * state.load * opened;
+  state.opened += opened;
+}
+
+// What the lag should be now: the share asked for is of the root mean square of the load over CMOD (of a load that rises
+// in proportion before there is one). Where more of it was spent already less is left, down to a half.
+double FixCohesiveDrive::lag_allowed() const
+{
+  if (!(state.load_sum > 0.0)) return lag_wanted / std::sqrt(3.0);
+  const double mean = std::sqrt(state.load_sum / state.opened) / state.peak;
+  const double spent = std::sqrt(state.error_sum / state.load_sum) / lag_wanted;
+  return lag_wanted * std::min(mean, 1.0) / std::clamp(spent, 1.0, 2.0);
 }
 
 void FixCohesiveDrive::mark_frames()
@@ -89,7 +106,8 @@ void FixCohesiveDrive::mark_frames()
 void FixCohesiveDrive::choose_rate()
 {
   const double share = nevery * update->dt * omega / (2.0 * M_PI);
-  const double wish = std::sqrt(lag_wanted / std::max(state.lag, 1e-3 * lag_wanted));
+  const double wanted = lag_allowed();
+  const double wish = std::sqrt(wanted / std::max(state.lag, 1e-3 * wanted));
   double factor = std::clamp(std::pow(wish, share * (wish < 1.0 ? HASTE : 1.0)), 0.5, 1.0 + share);
   factor = std::clamp(factor, lowest_rate / state.rate, highest_rate / state.rate);
   if (factor == 1.0) return;
@@ -123,7 +141,7 @@ double FixCohesiveDrive::compute_vector(int k)
     case 8: return state.kinetic;
     case 9: return state.damping;
     case 10: return state.rate;
-    case 11: return state.error_weight > 0.0 ? ERROR_PER_LAG * std::sqrt(state.error_sum / state.error_weight) : 0.0;
+    case 11: return state.load_sum > 0.0 ? ERROR_PER_EXCESS * std::sqrt(state.error_sum / state.load_sum) : 0.0;
     case 12: return state.frame_due;
     case 13: return state.cmod >= cmod_max ? 1.0 : 0.0;
     case 15: return state.time;

@@ -13,7 +13,7 @@
 using namespace LAMMPS_NS;
 
 // of what stands in restart files; another layout, another number. Before 2 there was none
-static constexpr double FORMAT = 2.0;
+static constexpr double FORMAT = 3.0;
 
 double FixCohesiveDrive::memory_usage()
 {
