@@ -86,6 +86,20 @@ def test_a_crack_that_closes_joins_again(lattice):
     np.testing.assert_allclose(values[1][POINTS[:, 0] > 0], [[2e-5, 0.0]] * 9, rtol=0, atol=ROUND_OFF)
 
 
+def test_flanks_of_another_field(lattice):
+    """Half a crack that one field has opened and the other not yet: read over the same material they differ little."""
+    particles, bonds = lattice
+    right = (particles.position[:, :1] > 0) * np.array([1.0, 0.0])
+    parted, before = (opening * right[None] for opening in (1.2e-5, 1.1e-5))  # bonds across lie at 30°
+    open_at, points = np.full(bonds.count, 1e-5), np.array([(0.5e-3, 6e-3)])
+    (there, _), (own, _) = (observe(particles, bonds, field, points, open_at) for field in (parted, before))
+    same, valid = observe(particles, bonds, before, points, open_at, joined_as_in=parted)
+    assert valid.all()
+    np.testing.assert_allclose(same[0, 0], [1.1e-5, 0], rtol=0, atol=ROUND_OFF)
+    assert np.abs(there - same).max() == pytest.approx(0.1e-5, rel=1e-9)  # round-off
+    assert np.abs(there - own).max() > 1e-6, "over its own it is a mean of both flanks"
+
+
 def test_rotation_of_the_whole_cuts_nothing(lattice):
     particles, bonds = lattice
     angle = 0.3

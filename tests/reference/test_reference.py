@@ -13,7 +13,7 @@ from pipeline.core.problem import Kinematics, Problem, Role
 from pipeline.core.units import MM
 from pipeline.equilibrium import solve as equilibrium
 from pipeline.reference.body import body_of
-from pipeline.reference.drive import Drive
+from pipeline.reference.drive import ERROR_PER_EXCESS, Drive, Energies
 from pipeline.reference.solve import Run, expectation, solve
 from pipeline.reference.step import Damping, State, advance, at_rest_place, with_bond_forces
 
@@ -124,6 +124,31 @@ def test_the_rate_rule() -> None:
     assert faster == pytest.approx(2**0.01)
     assert replace(drive, lag=1.0).factor(0.01, 0.5, lowest=0.9, highest=2) == pytest.approx(0.9)
     assert replace(drive, lag=0.0).factor(0.01, 0.5, lowest=0.9, highest=1.2) == pytest.approx(1.2)
+
+
+def test_what_motion_and_drag_take_is_a_force_over_the_way() -> None:
+    """10 J over 20 steps of 0.5 m at 100 N are 1 N, 1 %; over twice the opening that took this way so far, half."""
+    drive, energy = Drive(rate=0.5, peak=100.0, spent=0.0), Energies(0.0, 0.0, 0.0, kinetic=4.0, damping=6.0)
+    found = drive.measure(energy, cmod=2.0, load=80.0, line=8.0, steps=20, share=0.1)
+    assert found.lag == pytest.approx(0.01)
+    assert found.excess == pytest.approx(1.0)
+    assert found.error == pytest.approx(ERROR_PER_EXCESS * 1 / 80)
+    jumped = replace(drive, opened=2.0).measure(energy, cmod=7.0, load=80.0, line=28.0, steps=20, share=0.1)
+    assert jumped.lag == pytest.approx(0.01)
+    assert jumped.excess == pytest.approx(0.5)  # 5 m of opening took 20 m of way so far
+    swung = replace(found, rate=1e-9).measure(replace(energy, kinetic=14.0), 1.5, 80.0, 8.0, steps=20, share=0.1)
+    assert swung.excess == pytest.approx(0.9), "fades, and takes nothing in while the mouth swings back"
+    assert swung.lag == pytest.approx(10 / (100 * 20e-9)), "but the machine waits"
+
+
+def test_how_much_lag_is_allowed() -> None:
+    """A share of the rms load over CMOD: 1/√3 of the peak at first; less, to a half, where more was spent already."""
+    drive = Drive(rate=1.0, peak=100.0, spent=0.0)
+    assert drive.allowed(0.01) == pytest.approx(0.01 / np.sqrt(3))
+    steady = replace(drive, opened=2.0, load_squares=2.0 * 40**2)
+    assert steady.allowed(0.01) == pytest.approx(0.004)
+    assert replace(steady, excess_squares=2.0 * 0.6**2).allowed(0.01) == pytest.approx(0.004 / 1.5)
+    assert replace(steady, excess_squares=2.0 * 4**2).allowed(0.01) == pytest.approx(0.002)
 
 
 def test_a_run_that_does_not_arrive_is_refused(beam: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
