@@ -20,6 +20,7 @@ import typer
 from pipeline.cli import app
 from pipeline.equilibrium.path import Increments
 from pipeline.explicit import loading
+from pipeline.reference import drive
 from pipeline.store.fields import read_fields
 from pipeline.study import (
     cross_check,
@@ -29,6 +30,7 @@ from pipeline.study import (
     identify,
     model,
     observation,
+    paths,
     simulate,
     virtual_test,
     widening,
@@ -189,7 +191,9 @@ def test_every_key_of_a_result_is_explained(function):
         ("theory", f"within {loading.PERIODS} periods of the lowest mode"),
         ("theory", f"never below 1/{1 / loading.SLOWEST:.0f} of the highest"),
         ("theory", f"given up after {loading.LONGEST} periods"),
-        ("theory", f"with ℓ = ε/{1 / loading.LAG:.0f} wanted"),
+        ("theory", f"bracket so far exceeds ε/{1 / loading.LAG:.4g}"),
+        ("theory", f"\\text{{error}} = {drive.ERROR_PER_EXCESS:.4g} "),
+        ("engines", f"same strengths but for {paths.NEARLY:.1%}".replace("%", " %")),
         ("engines", f"between two records (default {loading.RECORD})"),
         (
             "theory",
