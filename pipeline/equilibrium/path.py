@@ -178,7 +178,6 @@ class Path:
         opened = found is not None and 0 < found.cmod - state.cmod <= allowed
         return found if opened else None
 
-
     def _forced(self, state: State, wanted: float) -> State | None:
         """Where the machine should move back, but no equilibrium has that CMOD either: it moves on, the crack jumps."""
         found = self.stepper.by_machine(state, state.free, state.machine + self._stiff * wanted)
