@@ -96,23 +96,24 @@ class Simulator:
         keys = [p if isinstance(p, str) else problem_key(p, self.engine.label) for p in problems]
         wanted = {k: p for k, p in zip(keys, problems, strict=True) if not isinstance(p, str)}
         names = {k: _name(run) for k, run in zip(keys, runs, strict=True)}
+        seen_in = {k: self._kept(k, p) for k, p in wanted.items()}  # read once: a file takes as long as a fit
+        missing = {k: p for k, p in wanted.items() if seen_in[k] is None}
         failed: dict[str, BaseException] = {}
         try:
             run_all(
-                self.engine.solve, wanted, self.store, executor=self.executor, workers=self.workers,
+                self.engine.solve, missing, self.store, executor=self.executor, workers=self.workers,
                 progress=self.progress, names=names,
             )  # fmt: skip
         except SimulationError as error:
             failed = error.failures
-        outcomes: list[Outcome] = []
-        for key, problem in zip(keys, problems, strict=True):
-            solution = None if isinstance(problem, str) else self.store.get(key)
-            if solution is None:
-                outcomes.append(problem if isinstance(problem, str) else str(failed.get(names[key], "it was not kept")))
-            else:
-                assert not isinstance(problem, str)
-                outcomes.append(self.response(problem, solution))
-        return outcomes
+        seen_in |= {k: self._kept(k, p) for k, p in missing.items()}
+        why = {k: str(failed.get(name, "it was not kept")) for k, name in names.items()}
+        return [p if isinstance(p, str) else seen_in[k] or why[k] for k, p in zip(keys, problems, strict=True)]
+
+    def _kept(self, key: str, problem: Problem) -> Response | None:
+        """What a simulation shows that is kept."""
+        solution = self.store.get(key)
+        return None if solution is None else self.response(problem, solution)
 
     def response(self, problem: Problem, solution: Solution) -> Response:
         """A solution at the points and abscissae."""

@@ -21,7 +21,6 @@ from pipeline.store.layouts import DIC
 from pipeline.store.results import prepare_output, read_arrays, read_result, write_arrays, write_result
 from pipeline.study import gauge
 from pipeline.study.assembly import settings_of
-from pipeline.study.dic_page import dic_page
 from pipeline.study.measurement import (
     Measurement,
     Series,
@@ -103,6 +102,8 @@ def measured_fields(
     result = dic_result(bundle, found, key)
     write_arrays(folder, DIC, dic_arrays(found))
     if page:
+        from pipeline.study.dic_page import dic_page
+
         progress.stage("drawing")
         dic_page(folder, bundle, found, result)
     write_result(folder, result)  # last: it says that all of this is whole

@@ -38,7 +38,12 @@ def test_the_cases_of_a_full_check():
         assert sum(c.kind == "outside" and name in c.effects and name in c.without for c in found) == 1
     assert all(not set(c.effects) & set(c.without) for c in found if c.kind != "outside")
     assert sum(c.kind == "none" and bool(c.without) for c in found) > 0  # a short library betrays nothing
-    assert sum(c.kind == "none" for c in found) >= 20
+    free = [c for c in found if c.kind == "none"]
+    assert len(free) == 24
+    assert len({(c.specimen, c.noise, bool(c.without)) for c in free}) == 24
+    for label in {c.replicates for c in found} - {""}:
+        assert len({(tuple(c.effects.items()), c.without) for c in found if c.replicates == label}) == 1
+    assert len({c.replicates for c in free}) == 6
     assert {c.specimen for c in found if c.kind == "none"} == set(range(6))
     assert sum(c.stranger is not None for c in found) >= 10
     for case in (c for c in found if c.kind == "pair"):
@@ -89,14 +94,14 @@ def test_tests_of_one_specimen_share_the_path_that_most_are_near_to():
         path = None if shift_mm is None else line + np.array([shift_mm * 1e-3, 0.0])
         return Look(name, model, path, peak, 0.5e-3)
 
-    looks = [look("a", -1.2), look("b", 0.0), look("c", 1.2), look("d", 3.0, 70e-6), look("e", None, 45e-6),
+    looks = [look("a", -1.5), look("b", 0.0), look("c", 1.5), look("d", 4.0, 75e-6), look("e", None, 40e-6),
              look("f", 0.0, model="n")]  # fmt: skip
     found = strips(looks)
     assert strips(looks[::-1]) == found  # whatever is looked at first
     assert found["a"] == found["b"] == found["c"]  # a and c are farther apart than that, but both near to b
     assert found["a"]["path_m"] == line.tolist()
-    assert found["d"]["path_m"][0][0] == pytest.approx(3e-3)
-    assert found["d"]["peak_m"] == 70e-6  # 1.4 times the others'
+    assert found["d"]["path_m"][0][0] == pytest.approx(4e-3)
+    assert found["d"]["peak_m"] == 75e-6  # 1.5 times the others'
     assert found["e"]["path_m"] is None
     assert found["e"]["peak_m"] == 50e-6
     assert found["f"] == {"path_m": line.tolist(), "peak_m": 50e-6, "last_m": 0.5e-3}

@@ -121,20 +121,32 @@ def drawn_cases(size: str, limits: Mapping[str, float], rng: np.random.Generator
 
 
 def _replicates(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Sets of specimens with the same effect at the largest multiple, and one without any, at low noise; every effect
-    also at high noise on one of them, and once more, larger, where the library lacks it."""
-    new: list[dict[str, Any]] = []
-    sets = [(), *((name,) for name in library())]
+    """Sets of tests with the same effect at the largest multiple and low noise, or without any; every effect also at
+    high noise on one of the specimens, and once more, larger, where the library lacks it."""
+    sets, alone = _free(limits, rng), []
+    for name in library():
+        sign = _sign(rng)
+        row = _row(((name, max(MULTIPLES)),), limits, sign) | {"noise": "low"}
+        one = _shortened(row, rng)
+        sets.append([one | {"specimen": k} for k in range(REPLICATES)])
+        again = {"specimen": int(rng.integers(REPLICATES))}
+        alone.append(row | again | {"noise": "high"})
+        alone.append(_left_out(_row(((name, HIDDEN),), limits, sign) | again, True, rng))
     labels = [f"set-{k:02d}" for k in rng.permutation(len(sets)).tolist()]
-    for label, names in zip(labels, sets, strict=True):
-        sign = float(rng.choice([-1.0, 1.0]))
-        row = _row(tuple((n, max(MULTIPLES)) for n in names), limits, sign) | {"noise": "low"}
-        new += [row | {"specimen": k, "replicates": label} for k in range(REPLICATES)]
-        if names:
-            again = {"specimen": int(rng.integers(REPLICATES))}
-            new.append(row | again | {"noise": "high"})
-            new.append(_left_out(_row(tuple((n, HIDDEN) for n in names), limits, sign) | again, True, rng))
-    return new
+    return alone + [row | {"replicates": label} for label, rows in zip(labels, sets, strict=True) for row in rows]
+
+
+def _free(limits: Mapping[str, float], rng: np.random.Generator) -> list[list[dict[str, Any]]]:
+    """Sets of effect-free tests, on every specimen at both noises, with the whole library and with a shortened one."""
+    places = [[(k, noise) for k in range(REPLICATES)] for noise in NOISE]
+    others = range(REPLICATES, len(SIZES["full"].specimens))
+    places.append([(k, noise) for noise in NOISE for k in others])
+    none = _row((), limits, 1.0)
+    rows = [row for _ in places for row in (none, _left_out(none, False, rng))]
+    return [
+        [row | {"specimen": k, "noise": noise} for k, noise in where]
+        for row, where in zip(rows, [w for w in places for _ in range(2)], strict=True)
+    ]
 
 
 def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], sign: float) -> dict[str, Any]:
@@ -151,6 +163,11 @@ def _left_out(row: dict[str, Any], hidden: bool, rng: np.random.Generator) -> di
     return row | {"without": tuple(sorted(names)), "kind": "outside" if hidden else row["kind"]}
 
 
+def _shortened(row: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """The row, now and then with a library that lacks others: effect-free tests with such are not alone then."""
+    return _left_out(row, False, rng) if rng.uniform() < SHORTENED else row
+
+
 def _small(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[str, Any]]:
     rows = [_row(names, limits, _sign(rng)) for names in SMALL]
     rows.append(_left_out(_row((("load_gain", 4.0),), limits, _sign(rng)), True, rng))
@@ -164,11 +181,6 @@ def _full(limits: Mapping[str, float], rng: np.random.Generator) -> list[dict[st
     for name in library():
         rows += _smaller(name, limits, len(geometries), rng)
     for specimen in range(len(geometries)):
-        for noise in NOISE:
-            row = _row((), limits, 1.0) | {"noise": noise, "specimen": specimen}
-            rows.append(_left_out(dict(row), False, rng))
-            if noise != "low" or specimen >= REPLICATES:
-                rows.append(row)
         for name, value in STRANGERS.items():
             rows.append(_row((), limits, 1.0) | {"kind": "outside", "stranger": (name, value), "specimen": specimen})
     return rows + [_pair(limits, rng) for _ in range(2 * len(geometries))]
@@ -183,8 +195,7 @@ def _smaller(name: str, limits: Mapping[str, float], specimens: int, rng: np.ran
         if row["effects"][name] in known:
             continue
         for noise in NOISE:
-            one = row | {"noise": noise}
-            rows.append(_left_out(one, False, rng) if rng.uniform() < SHORTENED else one)
+            rows.append(_shortened(row | {"noise": noise}, rng))
     return rows
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.config import RunSettings
+from pipeline.core.errors import PipelineError
 from pipeline.core.units import MM
 from pipeline.execution.here import Here
 from pipeline.execution.progress import Progress, Silent
@@ -25,6 +27,8 @@ from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
 from pipeline.study.effects import Band
 
+log = logging.getLogger("pipeline.study")
+
 SOME = 0.1 * MM  # CMOD of the problem by which models are told apart
 
 
@@ -34,11 +38,15 @@ def look(
 ) -> str:  # fmt: skip
     """Correlate images and find cracks: what tests of one specimen will share; keeps it in `out`/looks.
 
-    Arguments as of `diagnose`, most of which do not matter here.
+    Arguments as of `diagnose`, most of which do not matter here. A bundle that cannot be looked at is left out.
     """
     for path in bundles:
-        if not (out / LOOKS / f"{path.name}.json").exists():
+        if (out / LOOKS / f"{path.name}.json").exists():
+            continue
+        try:
             write_look(out, look_of(with_fields(read_bundle(path), settings_of(None, workers=1), Silent())))
+        except PipelineError as error:
+            log.warning("%s: %s", path.name, error)
     return f"{len(bundles)} bundles looked at"
 
 
