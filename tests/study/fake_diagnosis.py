@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +24,8 @@ def diagnose(
         if "write" in hint:
             Path(hint["write"]).write_bytes(b"x")
         if "sleep" in hint and not (check / "woken").exists():
-            (check / "woken").touch()
+            (check / "woken.part").write_text(str(os.getpid()))
+            (check / "woken.part").rename(check / "woken")
             time.sleep(hint["sleep"])
         if "wait_for" in hint and not (check / hint["wait_for"]).exists():
             raise RuntimeError("it was stopped")

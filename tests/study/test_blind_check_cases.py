@@ -10,7 +10,7 @@ import pytest
 from pipeline.core.errors import InputError
 from pipeline.gap.effects import library
 from pipeline.study.blind_check import cases as drawing
-from pipeline.study.blind_check.limits import limits_of
+from pipeline.study.blind_check.limits import library_digest, limits_of
 from pipeline.study.blind_check.looks import Look, strips
 from pipeline.study.blind_check.recording import taken
 from pipeline.study.blind_check.seal import digest
@@ -80,7 +80,7 @@ def test_the_limits_that_ship_are_of_the_nearest_radius_and_say_whose_they_are()
     assert limits_of(None, "seb", 0.9).source["radius_mm"] == 1.0
     told = LIMITS.told()
     assert told["of"] == "effect-free tests of engine B"
-    assert len(told["library_sha256"]) == 64
+    assert told["by_library_in_use"] is (told["library_sha256"] == library_digest())
     assert set(told["limits"]) == set(EFFECTS)
     assert all(x is None or x > 0 for x in told["limits"].values())
     with pytest.raises(InputError, match="holds no detection limits of dct"):

@@ -8,10 +8,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc", "/proc", "/sys", "/dev")
+WATCH = 0.5  # s
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -52,10 +55,18 @@ def main(arguments: list[str]) -> None:
     """Diagnose a bundle, or several together, under guard."""
     out, bundles, results, seed, without, target = arguments
     module, function = target.split(":")
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     sys.addaudithook(Guard(Path(out).resolve()))
     diagnose = getattr(importlib.import_module(module), function)
     names = tuple(n for n in without.split(",") if n)
     diagnose([Path(b) for b in bundles.split(os.pathsep)], Path(results), without=names, seed=int(seed), workers=1)
+
+
+def _end_with(parent: int) -> None:
+    """End when the process that started this one is gone: a run that goes on must not meet it."""
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
 
 
 if __name__ == "__main__":

@@ -93,7 +93,13 @@ def shipped_limits(geometry: str, radius_mm: float) -> Limits:
     entry = min(own, key=lambda e: abs(np.log(radius_mm / e["radius_mm"])))
     rows = {n: reached(n, row["limit"], row["d_prime_at_most"]) for n, row in entry["effects"].items()}
     source = {"of": "effect-free tests of engine B", **{k: v for k, v in entry.items() if k != "effects"}}
+    source["by_library_in_use"] = entry["library_sha256"] == library_digest()
     return Limits(_whole(rows), source)
+
+
+def library_digest() -> str:
+    """SHA-256 of the library of discrepancies that ships."""
+    return hashlib.sha256(resources.files("pipeline.gap").joinpath(LIBRARY).read_bytes()).hexdigest()
 
 
 def reached(name: str, limit: float | None, d_prime: float) -> float:
@@ -134,7 +140,6 @@ def make_limits(
     if not cards:
         raise InputError("no effect-free test could be diagnosed: there are no limits to be written")
     known = nearest(shipped(), geometry, radius_mm * MM)
-    library_text = resources.files("pipeline.gap").joinpath(LIBRARY).read_bytes()
     rows = medians(cards)
     entry = {
         "geometry": geometry,
@@ -143,7 +148,7 @@ def make_limits(
         "tests": len(cards),
         "version": __version__,
         "temperature": known.temperature,
-        "library_sha256": hashlib.sha256(library_text).hexdigest(),
+        "library_sha256": library_digest(),
         "effects": rows,
     }
     write_entry(file, entry)

@@ -73,7 +73,9 @@ def make(
     lock(truth, vault)
     made = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     write_seal(out, truth, vault, {"size": size, "made": made, "detection_limits": known.told()})
-    return f"{len(cases)} sealed tests; their truth lies locked in {vault.name}"
+    told = f"{len(cases)} sealed tests; their truth lies locked in {vault.name}"
+    stale = known.source.get("by_library_in_use") is False
+    return told + ("; the detection limits are of another library: see scripts/blind_limits.py" if stale else "")
 
 
 @dataclass(frozen=True)
