@@ -11,6 +11,7 @@ import numpy as np
 
 HASTE = 10.0  # how much faster the rate falls than it rises
 ERROR_PER_EXCESS = 2.25  # error of the load over the rms excess, at most (measured against the equilibrium engine)
+JUMP = 3.0  # a crack jumps where the mouth opens by so much more than the machine's way has opened it so far
 
 
 @dataclass(frozen=True)
@@ -71,21 +72,24 @@ class Drive:
 
         lag = Δ(E_kin + E_damp) / (P_peak × way), way = rate × steps, and the excess Δ(E_kin + E_damp) / way, in which
         the way counts as no shorter than so much opening took so far: where the crack jumps the machine (at `line`, m)
-        stands still. Where the mouth swings back nothing is added.
+        stands still, and that counts there only. Where the mouth swings back nothing is added.
         """
         peak, spent = max(self.peak, load), energy.kinetic + energy.damping
         now, way, keep = abs(spent - self.spent), self.rate * steps, 1 - min(1.0, share)
         opened = max(cmod - self.opened, 0.0)
-        excess = self.excess * keep
+        excess = counted = self.excess * keep
         if opened > 0 and cmod > 0:
-            excess = max(now / max(way, opened * line / cmod), excess)
+            usual = opened * line / cmod
+            counted = now / max(way, usual)
+            if usual <= JUMP * way:
+                counted = excess = max(counted, excess)
         return replace(
             self,
             peak=peak,
             spent=spent,
             lag=max(now / (peak * way), self.lag * keep),
             excess=excess,
-            excess_squares=self.excess_squares + excess**2 * opened,
+            excess_squares=self.excess_squares + counted**2 * opened,
             load_squares=self.load_squares + load**2 * opened,
             opened=self.opened + opened,
             cmod=cmod,

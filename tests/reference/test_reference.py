@@ -135,7 +135,10 @@ def test_what_motion_and_drag_take_is_a_force_over_the_way() -> None:
     assert found.error == pytest.approx(ERROR_PER_EXCESS * 1 / 80)
     jumped = replace(drive, opened=2.0).measure(energy, cmod=7.0, load=80.0, line=28.0, steps=20, share=0.1)
     assert jumped.lag == pytest.approx(0.01)
-    assert jumped.excess == pytest.approx(0.5)  # 5 m of opening took 20 m of way so far
+    assert jumped.excess == pytest.approx(0.5)  # 5 m of opening took 20 m of way so far: no jump yet
+    leapt = replace(drive, opened=2.0).measure(energy, cmod=12.0, load=80.0, line=48.0, steps=20, share=0.1)
+    assert leapt.excess == 0, "a jump is not held"
+    assert leapt.excess_squares == pytest.approx(10 * 0.25**2), "but counted: 10 J over 10 m of opening, 40 m of way"
     swung = replace(found, rate=1e-9).measure(replace(energy, kinetic=14.0), 1.5, 80.0, 8.0, steps=20, share=0.1)
     assert swung.excess == pytest.approx(0.9), "fades, and takes nothing in while the mouth swings back"
     assert swung.lag == pytest.approx(10 / (100 * 20e-9)), "but the machine waits"

@@ -17,6 +17,8 @@ using namespace LAMMPS_NS;
 static constexpr double HASTE = 10.0;
 // error of the load over the root mean square of the excess: up to so much (measured against the equilibrium engine)
 static constexpr double ERROR_PER_EXCESS = 2.25;
+// a crack jumps where the mouth opens by so much more than the machine's way has opened it so far
+static constexpr double JUMP = 3.0;
 
 double FixCohesiveDrive::kinetic_energy() const
 {
@@ -61,7 +63,8 @@ void FixCohesiveDrive::record()
 
 // What goes into motion and drag instead of the specimen, over the machine's way, is a force that the load is off by.
 // The lag is that force over the peak load. For the error at a CMOD the way counts as no shorter than so much opening
-// took so far, for where the crack jumps the machine stands still; where the mouth swings back nothing is added.
+// took so far, for where the crack jumps the machine stands still, and counts there only; where the mouth swings back
+// nothing is added.
 void FixCohesiveDrive::measure_lag()
 {
   const double lost = state.kinetic + state.damping, now = std::fabs(lost - state.lost_before);
@@ -72,11 +75,13 @@ void FixCohesiveDrive::measure_lag()
   const double keep = 1.0 - std::min(1.0, nevery * update->dt * omega / (2.0 * M_PI));
   state.lag = std::max(now / (state.peak * way), state.lag * keep);
   state.excess *= keep;
+  double counted = state.excess;
   if (opened > 0.0 && state.cmod > 0.0) {
     const double usual = opened * state.load_line_mean / state.cmod;
-    state.excess = std::max(now / std::max(way, usual), state.excess);
+    counted = now / std::max(way, usual);
+    if (usual <= JUMP * way) counted = state.excess = std::max(counted, state.excess);
   }
-  state.error_sum += state.excess * state.excess * opened;
+  state.error_sum += counted * counted * opened;
   state.load_sum += state.load * state.load * opened;
   state.opened += opened;
 }
