@@ -15,7 +15,7 @@ def main() -> None:
     parser.add_argument("--file", type=Path, default=Path("pipeline/gap/library.json"))
     parser.add_argument("--specimens", type=int, default=12)
     parser.add_argument("--first-seed", type=int, default=9100)
-    parser.add_argument("--effects", type=int, default=4, help="tests with an effect for every specimen")
+    parser.add_argument("--effects", type=int, default=6, help="tests with an effect for every specimen")
     parser.add_argument("--geometry", default="seb")
     parser.add_argument("--radius-mm", type=float, default=1.0)
     asked = parser.parse_args()

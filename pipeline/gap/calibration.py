@@ -89,8 +89,12 @@ def weights(answers: Sequence[Answer]) -> np.ndarray:
 
 
 def expected_error(answers: Sequence[Answer], temperature: float, bins: int = 5) -> float:
-    """Expected calibration error of the most probable answer: mean |stated − right| over bins of equal count."""
+    """Expected calibration error of the most probable answer: mean |stated − right| over bins of equal count.
+
+    Tests with and without effects count alike, as in `calibrated`.
+    """
     top = [(s.probability[s.ranked()[0]], s.ranked()[0] == a.truth) for a in answers for s in [a.scored(temperature)]]
-    stated, right = np.array(sorted(top), float).T
-    parts = np.array_split(np.arange(len(top)), min(bins, len(top)))
-    return float(sum(len(p) * abs(stated[p].mean() - right[p].mean()) for p in parts) / len(top))
+    stated, right = np.array(top, float).T
+    weight = weights(answers)
+    parts = np.array_split(np.lexsort((right, stated)), min(bins, len(top)))
+    return float(sum(abs(weight[p] @ (stated[p] - right[p])) for p in parts))

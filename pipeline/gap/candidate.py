@@ -22,11 +22,13 @@ class Candidate:
     names : tuple of effects' names; empty: the model as it is
     magnitudes : tuple of Magnitude, one an effect
     predict : Predict; with zero amplitudes the model as it is
+    doubt : amplitudes (k,) → (n, j) array B of the data: the prediction is uncertain by B Bᵀ there
     """
 
     names: tuple[str, ...]
     magnitudes: tuple[Magnitude, ...]
     predict: Predict
+    doubt: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
     def label(self) -> str:

@@ -128,7 +128,7 @@ def held_out(candidate: Candidate, data: Data, chosen: list[Fold], start: np.nda
     found = {}
     for fold in chosen:
         rest = ~fold.held
-        part = replace(candidate, predict=_part(candidate.predict, rest))
+        part = replace(candidate, predict=_part(candidate.predict, rest), doubt=None)
         at, *_ = best_point(part, Data(data.target[rest], data.metric.part(rest), data.box), start)
         q = len(data.box)
         found[fold.name] = np.where(fold.held, data.target - candidate.predict(at[:q], at[q:]), np.nan)

@@ -20,7 +20,7 @@ from pipeline.gap.noise import noise_bic
 from pipeline.gap.observation import Observation
 from pipeline.gap.response import Abscissae, Response
 from pipeline.gap.score import NONE, Scored, pairs, score
-from pipeline.gap.verdict import Verdict, verdict
+from pipeline.gap.verdict import Verdict, on_the_edge, verdict
 from pipeline.gap.weighing import fitted_to, weighed
 from pipeline.gap.where import Cell, where
 from pipeline.inverse.design import Design
@@ -136,7 +136,7 @@ def diagnose(
     Raises
     ------
     ConvergenceError
-        where the baseline cannot be simulated, or the best explanation lies on the edge of the grid
+        where the baseline cannot be simulated
     """
     counted = _Counted(simulate)
     wanted = sorted(library() if names is None else names)
@@ -162,25 +162,14 @@ def concluded(
     runs: int,
     closed: int = CLOSED,
 ) -> Diagnosis:
-    """Judge with all simulations at hand.
-
-    Raises
-    ------
-    ConvergenceError
-        where the best explanation lies on the edge of the grid
-    """
+    """Judge with all simulations at hand."""
     observation, data = weighed(observation, emulator, entry)
     fits, scored = _Look(observation, data, known, entry.temperature).judge(emulator)
     singles = {n: emulator.candidate([n], observation.mask) for n in known}
     best = fits[scored.ranked()[0]]
     table = card(singles, data, best.parameters, entry.temperature)
-    if best.at_edge:
-        raise ConvergenceError(
-            f"the best explanation, {best.candidate.label}, lies on the edge of the grid at f_max = "
-            f"{best.parameters[0]:.4g} N, delta_max = {best.parameters[1]:.4g} m: check units, or move [start] there"
-        )
     left = data.target - best.candidate.predict(best.parameters, best.amplitudes)
-    judged = gate(observation, left, data.metric.covariance, entry.freedom)
+    judged = gate(observation, left, uncertain(best, data), entry.freedom)
     none = fits[NONE]
     residual = data.target - none.candidate.predict(none.parameters, none.amplitudes)
     return Diagnosis(
@@ -194,10 +183,16 @@ def concluded(
         cells=where(observation, residual, data.metric.covariance),
         closures=closures(observation, data, fits, scored, rng, closed),
         noise_bic=noise_bic(observation, data, fits),
-        verdict=verdict(scored, table, judged),
+        verdict=on_the_edge(best) if best.at_edge else verdict(scored, table, judged),
         untested=untested,
         runs=runs,
     )
+
+
+def uncertain(best: Fitted, data: Data) -> np.ndarray:
+    """Covariance (n, n) of what an explanation leaves where it is right: Σ, and what it is itself uncertain by."""
+    doubt = None if best.candidate.doubt is None else best.candidate.doubt(best.amplitudes)
+    return data.metric.covariance if doubt is None else data.metric.covariance + doubt @ doubt.T
 
 
 def baseline(
@@ -218,10 +213,11 @@ def baseline(
     the emulator, and the best explanation
     """
     measuring = [n for n in sorted(names) if isinstance(effect(n), MeasurementEffect)]
+    clear = np.isfinite(observation.reading.field.sum(axis=2)).any(axis=0)
     for _ in range(MOVES + 1):
         outcomes = _nodes(simulate, [Run(f, d) for f, d in design.nodes()])
         values = np.reshape([o.flat() for o in outcomes], (*design.shape, -1))
-        emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values)
+        emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values, clear=clear)
         look = _Look(*weighed(observation, emulator, entry), measuring, entry.temperature)
         fits, scored = look.judge(emulator, with_pairs=False)
         best = fits[scored.ranked()[0]]

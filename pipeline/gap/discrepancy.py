@@ -82,6 +82,11 @@ class Discrepancy:
             placements=modes**2 * self.placements,
         )
 
+    def widened(self, factor: np.ndarray | float) -> Discrepancy:
+        """With standard deviations of single modes (k,), or of all, this many times as large."""
+        by = np.broadcast_to(factor, len(ALL))[:, None]
+        return replace(self, amplitude=by * self.amplitude, waves=by * self.waves)
+
     def covariance(self, sight: Sight, load_scale: float) -> np.ndarray:
         """Covariance (2sp + s, 2sp + s) of `Reading.flat`, m² and N²."""
         found = self.of_modes(sight, load_scale)

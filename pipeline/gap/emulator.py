@@ -12,6 +12,7 @@ from pipeline.core.errors import InputError
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.effect import MeasurementEffect
 from pipeline.gap.effects import effect
+from pipeline.gap.modes import modal
 from pipeline.gap.observation import Reading, Sight
 from pipeline.gap.response import Abscissae, Response, continued, read, split
 from pipeline.inverse.surrogate import LagrangeSurrogate
@@ -40,6 +41,18 @@ class Signature:
         weight = np.array([value * (value - two) / (one * (one - two)), value * (value - one) / (two * (two - one))])
         return weight @ self.changes
 
+    @property
+    def slope(self) -> np.ndarray:
+        """Change (n,) for a value of one, of the straight line nearest to the two."""
+        return np.asarray(self.values @ self.changes / (self.values @ self.values))
+
+    def curved(self, value: float) -> np.ndarray:
+        """The part (n,) of the change that does not grow in proportion to the value.
+
+        Two values cannot tell a curve from a crack that goes another way in one of the simulations.
+        """
+        return self.at(value) - value * self.slope
+
     def corrected(self, value: float, error: np.ndarray) -> Signature:
         """With a change that grows in proportion to the value and is `error` (n,) at this one."""
         return replace(self, changes=self.changes + np.outer(self.values / value, error))
@@ -58,8 +71,10 @@ class Emulator:
     signatures : effect → Signature, physics effects only
     offset : (n,) array; added to everything, so that a confirmed point is met exactly
     again : (parameters (2,), `Response.flat` (n,)) of simulations beside a confirmed point, which the function is not
-    placed : (n,) arrays; changes of `Response.flat` when the lattice lies elsewhere on the specimen
         drawn through: what they differ by from it is scatter
+    placed : (n,) arrays; changes of `Response.flat` when the lattice lies elsewhere on the specimen: what is read is
+        the mean of all places
+    clear : (p,) bool; points that tell what effects do to the flanks, None: all
     """
 
     sight: Sight
@@ -71,6 +86,7 @@ class Emulator:
     offset: np.ndarray | float = 0.0
     again: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     placed: tuple[np.ndarray, ...] = ()
+    clear: np.ndarray | None = None
 
     @cached_property
     def _known(self) -> np.ndarray:
@@ -86,9 +102,23 @@ class Emulator:
 
     @cached_property
     def _smooth(self) -> tuple[Mapping[str, Signature], np.ndarray]:
-        """Signatures and offset without gaps."""
-        whole = {n: replace(s, changes=self._continued(s.changes)) for n, s in self.signatures.items()}
+        """Signatures, of the modes only, and offset without gaps.
+
+        What an effect changes beside the modes depends on which bonds hold which particle: no other model has it.
+        """
+        whole = {n: replace(s, changes=self._modal(s.changes)) for n, s in self.signatures.items()}
         return whole, self._continued(np.broadcast_to(self.offset, self.values.shape[-1:]))
+
+    def _modal(self, changes: np.ndarray) -> np.ndarray:
+        """Changes (2, n) of whole responses without gaps, and with no more than modes in their fields."""
+        found = []
+        for gappy, whole in zip(changes, self._continued(changes), strict=True):
+            parts = [split(row, self.abscissae, len(self.sight.points)) for row in (gappy, whole)]
+            use = np.isfinite(parts[0].field.sum(axis=2))
+            if self.clear is not None:
+                use &= self.clear
+            found.append(np.concatenate([modal(self.sight, use, parts[1].field).ravel(), parts[1].load]))
+        return np.array(found)
 
     def _continued(self, flat: np.ndarray) -> np.ndarray:
         """Numbers (..., n) whose gaps are bridged; they are never compared, see `available`."""
@@ -100,6 +130,12 @@ class Emulator:
     @cached_property
     def _usual(self) -> np.ndarray:
         return self.abscissae.frames_to(self.sight.cmod)
+
+    @cached_property
+    def _shift(self) -> np.ndarray:
+        """From the lattice where it lies to the mean of all places; (n,)."""
+        rows = self._continued(np.reshape(self.placed, (len(self.placed), self.values.shape[-1])))
+        return np.asarray(rows.sum(axis=0) / (len(self.placed) + 1))
 
     @property
     def box(self) -> np.ndarray:
@@ -117,7 +153,7 @@ class Emulator:
         return np.exp(RASTER * np.rint(np.log(parameters) / RASTER))
 
     def response(self, parameters: np.ndarray, physics: Mapping[str, float]) -> Response:
-        """What a simulation would say."""
+        """What one simulation would say, the lattice lying where it lies."""
         signatures, offset = self._smooth
         flat = self._surrogate.value(parameters) + offset
         for name, value in physics.items():
@@ -142,7 +178,8 @@ class Emulator:
         if field_at is self.sight.cmod and load_at is self.sight.cmod:
             found = self._at_stations(parameters, physics)
         else:
-            simulated = self.response(parameters, physics)
+            flat = self.response(parameters, physics).flat() + self._shift
+            simulated = split(flat, self.abscissae, len(self.sight.points))
             weights = self.abscissae.frames_to(field_at)
             rows = weights @ simulated.field.reshape(len(simulated.field), -1)
             field = rows.reshape(-1, *simulated.field.shape[1:])
@@ -153,12 +190,13 @@ class Emulator:
 
     @cached_property
     def _read(self) -> tuple[LagrangeSurrogate, Mapping[str, Signature], np.ndarray]:
-        """Grid, signatures and offset at the usual stations: all that is read there is linear in what is simulated."""
+        """Grid, signatures and what is added at the usual stations: all is linear in what is simulated."""
         signatures, offset = self._smooth
         values = self._surrogate.values
         grid = self._at_usual(values.reshape(-1, values.shape[-1])).reshape(*values.shape[:2], -1)
         there = {n: replace(s, changes=self._at_usual(s.changes)) for n, s in signatures.items()}
-        return LagrangeSurrogate(self.f_max, self.delta_max, grid), there, self._at_usual(offset[None])[0]
+        added = self._at_usual((offset + self._shift)[None])[0]
+        return LagrangeSurrogate(self.f_max, self.delta_max, grid), there, added
 
     def _at_usual(self, rows: np.ndarray) -> np.ndarray:
         """Numbers (j, n) of whole responses as `Reading.flat` (j, 2sp + s) at the usual stations."""
@@ -215,21 +253,35 @@ class Emulator:
             chosen,
             tuple(effect(n).magnitude for n in chosen),
             lambda parameters, amplitudes: self.reading(parameters, chosen, amplitudes).flat()[mask],
+            lambda amplitudes: self._doubt(chosen, amplitudes)[:, mask].T,
         )
+
+    def _doubt(self, names: Sequence[str], amplitudes: np.ndarray) -> np.ndarray:
+        """What is curved in the physics effects among some; (j, 2sp + s)."""
+        _, physics = self._sorted(names, amplitudes)
+        signatures = self._read[1]
+        rows = [signatures[name].curved(value) for name, value in physics.items()]
+        return np.reshape(rows, (len(rows), 2 * self.sight.cmod.size * len(self.sight.points) + self.sight.cmod.size))
 
     def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
         """Moved by what a simulation without effects at these parameters, `Response.flat` (n,), says otherwise."""
         return replace(self, offset=self.offset + simulated - self.response(parameters, {}).flat())
 
     def elsewhere(self, mask: np.ndarray) -> np.ndarray:
-        """What other places of the lattice change of the data; (places, n)."""
+        """What the places of the lattice differ by from their mean; (places, n) of the data, zero of a single place."""
         points, cmod = len(self.sight.points), self.sight.cmod
         rows = [read(split(p, self.abscissae, points), self.abscissae, cmod, cmod).flat()[mask] for p in self.placed]
-        return np.nan_to_num(np.reshape(rows, (len(rows), int(mask.sum()))))
+        changes = np.nan_to_num(np.reshape([np.zeros(int(mask.sum())), *rows], (-1, int(mask.sum()))))
+        return changes - changes.mean(axis=0)
+
+    def slopes(self, mask: np.ndarray) -> dict[str, np.ndarray]:
+        """What physics effects change of the data (n,) for a value of one, as far as it grows in proportion."""
+        return {name: signature.slope[mask] for name, signature in self._read[1].items()}
 
     def jitter(self, mask: np.ndarray) -> np.ndarray:
         """What the simulations beside a confirmed point differ by from the function; (j, n) of the data."""
-        rows = [self.confirmed(at, flat).reading(at) - self.reading(at) for at, flat in self.again]
+        bare = replace(self, signatures={})  # of which none is read here
+        rows = [bare.confirmed(at, flat).reading(at) - bare.reading(at) for at, flat in self.again]
         return np.array([row.flat()[mask] for row in rows]).reshape(len(rows), int(mask.sum()))
 
     def with_confirmed(self, name: str, value: float, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:

@@ -44,6 +44,11 @@ class Data:
         q = len(self.box)
         return self.metric.white(self.target - candidate.predict(at[:q], at[q:]))
 
+    def doubt(self, candidate: Candidate, amplitudes: np.ndarray) -> np.ndarray | None:
+        """White columns (n, j) by which a candidate itself is uncertain; None: by nothing."""
+        found = None if candidate.doubt is None else candidate.doubt(amplitudes)
+        return None if found is None or not found.size else self.metric.white(found)
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -246,7 +251,7 @@ def _profile(candidate: Candidate, data: Data, best: Point) -> Callable[[np.ndar
             here, residual = moved, left
             if gained < SETTLED:
                 break
-        return data.metric.log_likelihood(residual) + constant
+        return data.metric.log_likelihood(residual, data.doubt(candidate, node)) + constant
 
     return profile
 

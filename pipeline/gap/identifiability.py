@@ -60,7 +60,8 @@ class _Signal:
 
     def of(self, amplitudes: np.ndarray) -> np.ndarray:
         change = self.data.metric.white(self.candidate.predict(self.at, amplitudes) - self.none)
-        return change - self.slopes @ (self.slopes.T @ change)
+        left = change - self.slopes @ (self.slopes.T @ change)
+        return doubted(left, self.data.doubt(self.candidate, amplitudes))
 
     def weakest(self, value: float) -> np.ndarray:
         """Of all directions and signs that a size allows, the change that is seen least."""
@@ -109,6 +110,14 @@ def _signal(candidate: Candidate, data: Data, parameters: np.ndarray) -> _Signal
     at = np.append(parameters, none)
     slopes = np.linalg.qr(jacobian(candidate, data, at, np.arange(len(data.box))))[0]
     return _Signal(candidate, data, parameters, candidate.predict(parameters, none), slopes)
+
+
+def doubted(change: np.ndarray, doubt: np.ndarray | None) -> np.ndarray:
+    """(I + B Bᵀ)^(−1/2) times a white change (n,): what is left of it where it is itself uncertain by B (n, k)."""
+    if doubt is None:
+        return change
+    shape, strength, _ = np.linalg.svd(doubt, full_matrices=False)
+    return np.asarray(change - shape @ ((1 - 1 / np.sqrt(1 + strength**2)) * (shape.T @ change)))
 
 
 def _limit(signal: _Signal, largest: float, root: float) -> float:

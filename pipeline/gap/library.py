@@ -17,7 +17,7 @@ from pipeline.gap.discrepancy import ALL, Discrepancy
 from pipeline.gap.modes import LOAD
 from pipeline.gap.observation import Observation
 
-FILE, FORMAT = "library.json", 2
+FILE, FORMAT = "library.json", 3
 ENOUGH = 20  # tests behind a temperature
 SIZES = np.where([mode == LOAD for mode in ALL], 1e-2, UM)  # units of amplitudes in the file: µm, per cent of the load
 
@@ -54,6 +54,7 @@ class Entry:
     freedom : float; second degrees of freedom of F that left-out specimens follow, for the gate
     parameters : "f_max", "delta_max" → mean and standard deviation of log(identified/true) of the specimens
     seeds : (first, last) of the specimens
+    apparent : physics effect → standard deviation of the value that specimens without effects seem to have
     """
 
     domain: Domain
@@ -64,6 +65,7 @@ class Entry:
     freedom: float = 20.0
     parameters: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     seeds: tuple[int, int] = (0, 0)
+    apparent: Mapping[str, float] = field(default_factory=dict)
 
     def warnings(self, geometry: str, radius: float, observation: Observation) -> list[str]:
         """What of a test lies outside the domain; one sentence each."""
@@ -161,6 +163,7 @@ def _entry(raw: Mapping[str, Any]) -> Entry:
         raw["freedom"],
         {name: (one, two) for name, (one, two) in raw["parameters"].items()},
         (raw["seeds"][0], raw["seeds"][1]),
+        raw["apparent"],
     )
 
 
@@ -194,6 +197,7 @@ def _raw(entry: Entry) -> dict[str, Any]:
         "placements": round(x.placements, 4),
         "freedom": round(entry.freedom, 3),
         "parameters": {name: [round(v, 4) for v in both] for name, both in entry.parameters.items()},
+        "apparent": {name: float(f"{value:.3g}") for name, value in entry.apparent.items()},
         "temperature": round(entry.temperature, 4),
         "tests": entry.tests,
         "check": {mode: round(value, 3) for mode, value in entry.check.items()},

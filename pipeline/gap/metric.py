@@ -54,18 +54,22 @@ class Metric:
         """L⁻¹ times values (n,) or (n, k): independent, of standard deviation one."""
         return self._root[0] @ values
 
-    def log_likelihood(self, residual: np.ndarray) -> float:
+    def log_likelihood(self, residual: np.ndarray, doubt: np.ndarray | None = None) -> float:
         """Logarithm of the density of a white residual (n,), but for a constant of the metric.
 
         −χ²/2 where the scale is known; else the mean over as many equally probable values of the variance's factor.
+
+        Parameters
+        ----------
+        residual : (n,) array
+        doubt : (n, k) array B; white, a further covariance B Bᵀ of these data
         """
         share = self._root[1]
         if not share.any():
-            return float(-0.5 * residual @ residual)
+            return _log_density(residual, np.ones(residual.size), doubt)
         middle = (np.arange(SCALES) + 0.5) / SCALES
-        factor = self.tail / (2 * gammaincinv(self.tail / 2, middle))[:, None]  # of S
-        variance = 1 + share * (factor - 1)
-        terms = -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=1)
+        factor = self.tail / (2 * gammaincinv(self.tail / 2, middle))  # of S
+        terms = [_log_density(residual, 1 + share * (f - 1), doubt) for f in factor]
         return float(logsumexp(terms) - np.log(SCALES))
 
     def draws(self, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -84,3 +88,14 @@ class Metric:
     def std(self) -> np.ndarray:
         """Standard deviation of every datum; (n,)."""
         return np.sqrt(np.diag(self.covariance))
+
+
+def _log_density(residual: np.ndarray, variance: np.ndarray, doubt: np.ndarray | None) -> float:
+    """Logarithm of a normal density of covariance diag(variance) + B Bᵀ, but for (2π)^(n/2) (Woodbury 1950)."""
+    found = -0.5 * float(np.sum(residual**2 / variance + np.log(variance)))
+    if doubt is None or not doubt.size:
+        return found
+    weighed = doubt / variance[:, None]
+    inner = np.eye(doubt.shape[1]) + doubt.T @ weighed
+    along = weighed.T @ residual
+    return found + 0.5 * float(along @ np.linalg.solve(inner, along) - np.linalg.slogdet(inner)[1])

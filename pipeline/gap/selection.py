@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from pipeline.gap.discrepancy import Discrepancy
+from pipeline.gap.discrepancy import ALL, Discrepancy
 from pipeline.gap.gate import Gate, gate
 from pipeline.gap.learning import Remnant, learn, local_factor
+from pipeline.gap.seeming import Seeming, apparent
 
 FACTORS = np.geomspace(0.02, 50.0, 23)  # of the variance of all modes, that are tried
 SCALES = np.geomspace(0.1, 3.0, 30)  # of the same, for all specimens
@@ -32,12 +33,14 @@ class Rest:
     slopes : (n, q) array; derivatives of the prediction by the parameters, in any unit
     scatter : (n, n) array; covariance of the simulations' own scatter
     elsewhere : (n, n) array; mean product of what other places of the lattice change, or 0
+    effects : physics effect → (n,) array; what a value of one changes
     """
 
     remnant: Remnant
     slopes: np.ndarray
     scatter: np.ndarray
     elsewhere: np.ndarray | float = 0.0
+    effects: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def values(self) -> np.ndarray:
@@ -104,16 +107,20 @@ class Selected:
     freedom : float; second degrees of freedom of F, for the gate
     check : mode → mean χ² over degrees of freedom, at each specimen's own scale
     log_density : float; of all specimens left out
+    apparent : physics effect → standard deviation of the value that specimens seem to have
     """
 
     discrepancy: Discrepancy
     freedom: float
     check: dict[str, float]
     log_density: float
+    apparent: dict[str, float]
 
 
 def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Sequence[float] = PLACED) -> Selected:
     """The discrepancy of all, with the share of their own waves and the scales that are likeliest for those left out.
+
+    Modes in which specimens left out are still farther off than they should be are widened by just that.
 
     Parameters
     ----------
@@ -123,18 +130,40 @@ def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Se
     tried = [(share, place, left_out(rests, share, place)) for share in shares for place in placed]
     found = [(scale_of([o.densities for o in left]), share, place, left) for share, place, left in tried]
     scale, share, place, left = max(found, key=lambda one: one[0].log_density)
+    wider = np.array([max(checked(left, scale).get(mode, 1.0), 1.0) for mode in ALL])
+    left = left_out(rests, share, place, wider)
+    scale = scale_of([o.densities for o in left])
     local = float(np.exp(np.mean([np.log(o.local) for o in left])))
     gates = [o.gate(scale.typical) for o in left]
-    check: dict[str, list[float]] = {}
+    widest = learnt(rests, share, place).widened(np.sqrt(wider))
+    return Selected(
+        replace(widest.scaled(np.sqrt(scale.typical), local), tail=scale.tail),
+        freedom_of([(g.ratio[m], g.freedom[m]) for g in gates for m in g.ratio]),
+        checked(left, scale),
+        scale.log_density,
+        apparent([seeming(one, scale) for one in left]),
+    )
+
+
+def checked(left: Sequence[LeftOut], scale: Scale) -> dict[str, float]:
+    """Mode → mean χ² over degrees of freedom of specimens left out, each at its own scale."""
+    found: dict[str, list[float]] = {}
     for one in left:
         for mode, ratio in one.gate(one.own(scale)).ratio.items():
-            check.setdefault(mode, []).append(ratio)
-    return Selected(
-        replace(learnt(rests, share, place).scaled(np.sqrt(scale.typical), local), tail=scale.tail),
-        freedom_of([(g.ratio[m], g.freedom[m]) for g in gates for m in g.ratio]),
-        {mode: float(np.mean(values)) for mode, values in check.items()},
-        scale.log_density,
-    )
+            found.setdefault(mode, []).append(ratio)
+    return {mode: float(np.mean(values)) for mode, values in found.items()}
+
+
+def seeming(one: LeftOut, scale: Scale) -> Seeming:
+    """What is left of a specimen, and effects, in standard deviations of what the others say, beside the parameters."""
+    root = cholesky(one.fixed + one.own(scale) * one.modes, lower=True)
+    base = np.linalg.qr(solve_triangular(root, one.rest.slopes, lower=True))[0]
+
+    def beside(values: np.ndarray) -> np.ndarray:
+        white = solve_triangular(root, values, lower=True)
+        return np.asarray(white - base @ (base.T @ white))
+
+    return Seeming(beside(one.rest.values), {name: beside(x) for name, x in one.rest.effects.items()})
 
 
 def learnt(rests: Sequence[Rest], share: float, place: float = 0.0) -> Discrepancy:
@@ -145,12 +174,12 @@ def learnt(rests: Sequence[Rest], share: float, place: float = 0.0) -> Discrepan
     return replace(found, white=np.sqrt(np.maximum(excess, 0.0) * noise / len(rests)))
 
 
-def left_out(rests: Sequence[Rest], share: float, place: float = 0.0) -> list[LeftOut]:
-    """Every specimen beside what the others say."""
+def left_out(rests: Sequence[Rest], share: float, place: float = 0.0, wider: np.ndarray | float = 1.0) -> list[LeftOut]:
+    """Every specimen beside what the others say, the variances of the modes times `wider` (k,)."""
     found, white = [], learnt(rests, share, place).white
     for k, rest in enumerate(rests):
         others = [r.remnant for i, r in enumerate(rests) if i != k]
-        model = replace(learn(others, share), white=white, placements=place)
+        model = replace(learn(others, share), white=white, placements=place).widened(np.sqrt(wider))
         factor = local_factor(rest.remnant.observation, model)
         fixed, modes = rest.beside(model.scaled(1.0, factor))
         found.append(LeftOut(rest, fixed, modes, restricted(rest.values, rest.slopes, fixed, modes), factor))

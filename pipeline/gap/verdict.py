@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.gap.fit import Fitted
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import Card
 from pipeline.gap.score import NONE, Scored
@@ -62,3 +63,15 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
     sure = [n for n in named if scored.part(n) >= SURE]
     told += "".join(f"; {n} takes part, alone or with others, with {scored.part(n):.2f}" for n in sure)
     return Verdict(ONE_OF, named, told)
+
+
+def on_the_edge(best: Fitted) -> Verdict:
+    """What is said where the grid has followed the best explanation and still does not reach it."""
+    f_max, delta_max = best.parameters
+    return Verdict(
+        OUTSIDE,
+        (),
+        f"the best explanation, {best.candidate.label}, lies on the edge of the grid at f_max = {f_max:.4g} N, "
+        f"delta_max = {delta_max:.4g} m: no effect of the library explains these data; or check units, or move [start] "
+        "there",
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -25,14 +26,26 @@ def weighed(observation: Observation, emulator: Emulator, entry: Entry) -> tuple
     local = np.diag(part.noise)
     cut = part.reading.field.size
     local[:cut, :cut] += entry.discrepancy.local(part.sight)
+    local[some] += apparent(emulator, mask, entry.apparent)
     metric = Metric(modes + local[some] + scatter(emulator, mask), modes, entry.discrepancy.tail)
     return part, Data(part.reading.flat()[mask], metric, emulator.box)
 
 
 def elsewhere(emulator: Emulator, mask: np.ndarray) -> np.ndarray:
-    """Mean product (n, n) of what other places of the lattice change: which bonds a stone holds is an accident."""
+    """Covariance (n, n) of the mean of the lattice's places: which bonds a stone holds is an accident."""
     changes = emulator.elsewhere(mask)
-    return changes.T @ changes / max(len(changes), 1)
+    return changes.T @ changes / max(len(changes) * (len(changes) - 1), 1)
+
+
+def apparent(emulator: Emulator, mask: np.ndarray, scatter: Mapping[str, float]) -> np.ndarray:
+    """Covariance (n, n) of effects that specimens seem to have though there are none.
+
+    How many bonds of which kind a crack meets is as random as if interfaces were stronger in one specimen than in the
+    next: `scatter` holds the standard deviations by the names of physics effects.
+    """
+    columns = [scatter[name] * slope for name, slope in emulator.slopes(mask).items() if scatter.get(name, 0.0) > 0]
+    rows = np.reshape(columns, (len(columns), int(mask.sum())))
+    return rows.T @ rows
 
 
 def fitted_to(entry: Entry, observation: Observation, emulator: Emulator, best: Fitted) -> Entry:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.calibration import Answer, Calibration, calibrated, expected_error
 from pipeline.gap.effects import effect
 from pipeline.gap.library import Entry, nearest, parse
+from pipeline.gap.score import NONE
 from pipeline.study.gap_library import write_entry
 from pipeline.study.gap_trials import Bench, Trial
 
-SIZES = (0.5, 4.0)  # times the detection limit, log-uniform, at most the plausible maximum
+SIZES = (0.15, 1.0)  # of the plausible maximum, log-uniform
 
 log = logging.getLogger("pipeline.study")
 
@@ -29,7 +30,7 @@ def calibrate(
     file: Path,
     *,
     seeds: Sequence[int],
-    effects: int = 4,
+    effects: int = 6,
     geometry: str = "seb",
     radius_mm: float = 1.0,
     progress: Progress | None = None,
@@ -88,24 +89,36 @@ def answer(trial: Trial) -> Answer:
 
 def specimen_trials(bench: Bench, effects: int) -> list[Trial]:
     """One test without an effect and so many with, of different effects and random size."""
-    found: list[Trial] = []
-    try:
-        free = bench.trial({})
-        found.append(free)
-        for name, value in drawn(free.limits, effects, np.random.default_rng(bench.seed)):
-            found.append(bench.trial({name: value}))
-    except PipelineError as error:
-        log.warning("a trial of seed %d is left out: %s", bench.seed, error)
+    found = tried(bench, {})
+    if not found:
+        return []
+    for name, value in drawn(found[0].limits, effects, np.random.default_rng(bench.seed)):
+        found += tried(bench, {name: value})
     return found
 
 
-def drawn(limits: Mapping[str, float | None], count: int, rng: np.random.Generator) -> list[tuple[str, float]]:
-    """Effects and sizes by chance, from detection limits (None: there is none; then up to the plausible maximum)."""
-    names = sorted(limits)
-    chosen = rng.choice(len(names), size=min(count, len(names)), replace=False)
-    factors = SIZES[0] * (SIZES[1] / SIZES[0]) ** rng.uniform(size=len(chosen))
-    signs = rng.choice([-1.0, 1.0], size=len(chosen))
-    return [(names[i], sized(names[i], limits[names[i]], f, s)) for i, f, s in zip(chosen, factors, signs, strict=True)]
+def tried(bench: Bench, effects: dict[str, float]) -> list[Trial]:
+    """The trial, where it can be simulated."""
+    try:
+        return [bench.trial(effects)]
+    except PipelineError as error:
+        log.warning("a trial of seed %d, %s, is left out: %s", bench.seed, effects or NONE, error)
+        return []
+
+
+def drawn(names: Collection[str], count: int, rng: np.random.Generator) -> list[tuple[str, float]]:
+    """Effects and sizes by chance: `SIZES` of the plausible maximum, log-uniform, either way.
+
+    Not of detection limits: these depend on the temperature that is sought.
+    """
+    found = []
+    for name in rng.choice(sorted(names), size=min(count, len(names)), replace=False):
+        size = effect(name).magnitude
+        value = size.high * SIZES[0] * (SIZES[1] / SIZES[0]) ** rng.uniform()
+        if size.low < 0 and rng.uniform() < 0.5:
+            value = -value
+        found.append((str(name), float(f"{value:.3g}")))
+    return found
 
 
 def sized(name: str, limit: float | None, factor: float, sign: float = 1.0) -> float:

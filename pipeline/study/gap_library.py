@@ -16,12 +16,13 @@ from pipeline.core.errors import ConvergenceError
 from pipeline.core.units import MM
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.diagnosis import baseline, with_placements
+from pipeline.gap.diagnosis import baseline, with_placements, with_signatures
 from pipeline.gap.discrepancy import ALL, KNOTS, Discrepancy
+from pipeline.gap.effects import library
 from pipeline.gap.emulator import Emulator
 from pipeline.gap.fit import fit
 from pipeline.gap.learning import Remnant, learn
-from pipeline.gap.library import Domain, Entry, parse, written
+from pipeline.gap.library import FORMAT, Domain, Entry, parse, written
 from pipeline.gap.observation import Observation
 from pipeline.gap.selection import Rest, selected
 from pipeline.gap.weighing import elsewhere, scatter, weighed
@@ -116,7 +117,7 @@ def write_entry(file: Path, entry: Entry) -> None:
     old: list[Entry] = []
     if file.exists():
         raw = json.loads(file.read_text("utf-8"))
-        old = parse(raw) if raw.get("format") == 2 else []
+        old = parse(raw) if raw.get("format") == FORMAT else []
     others = [e for e in old if not same(e.domain, entry.domain)]
     told = {"version": __version__, "engine": ENGINE, "pitch": "1.9 radii, irregular"}
     entries = sorted([*others, entry], key=lambda e: (e.domain.geometry, e.domain.radius))
@@ -149,7 +150,9 @@ def one_specimen(
     design = Design(start, FACTORS, FACTORS)
     simulator = replace(simulator, band=band)
     emulator, best = baseline(observation, look.abscissae, simulator, design, entry)
-    emulator = with_placements(emulator, simulator, emulator.rounded(best.parameters))
+    at = emulator.rounded(best.parameters)
+    emulator = with_placements(emulator, simulator, at)
+    emulator, _ = with_signatures(emulator, simulator, at, list(library()))
     return Specimen(folder.name, observation, emulator, (truth["f_max_n"], truth["delta_max_m"]))
 
 
@@ -162,7 +165,10 @@ def rest_of(specimen: Specimen, entry: Entry) -> tuple[Rest, np.ndarray]:
     remnant = Remnant(replace(observation, reading=left), observation.load_scale)
     slopes = np.column_stack([_slope(candidate, found.parameters, step) for step in np.diag(STEP * data.width)])
     mask = observation.mask
-    rest = Rest(remnant, slopes, scatter(specimen.emulator, mask), elsewhere(specimen.emulator, mask))
+    rest = Rest(
+        remnant, slopes, scatter(specimen.emulator, mask), elsewhere(specimen.emulator, mask),
+        specimen.emulator.slopes(mask),
+    )  # fmt: skip
     return rest, found.parameters
 
 
@@ -187,6 +193,7 @@ def learnt(specimens: Sequence[Specimen], domain: Domain) -> Entry:
         chosen.check,
         chosen.freedom,
         {n: (float(x.mean()), float(x.std(ddof=1))) for n, x in zip(("f_max", "delta_max"), off.T, strict=True)},
+        apparent=chosen.apparent,
     )
 
 

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import ConvergenceError
-from pipeline.gap.diagnosis import baseline, diagnose, with_placements
+from pipeline.gap.diagnosis import Run, baseline, diagnose, with_placements
 from pipeline.gap.effects import library
-from pipeline.gap.identifiability import card
+from pipeline.gap.emulator import Signature
+from pipeline.gap.identifiability import card, doubted
 from pipeline.gap.observation import Observation, Reading
+from pipeline.gap.response import split
 from pipeline.gap.weighing import scatter, weighed
 from pipeline.inverse.design import Design
 from tests.gap.scene import ABSCISSAE, PHYSICS, START, entry, measured, simulate
@@ -103,7 +105,7 @@ def test_simulations_that_jump_widen_the_metric():
         return [replace(o, load=o.load + j) for j, o in zip(jumps, simulate(runs), strict=True)]
 
     test = measured(rng=np.random.default_rng(2))
-    calm, wild = (found(test, ["load_gain"], simulator).emulator for simulator in (simulate, jumping))
+    calm, wild = (found(test, ["modulus"], simulator).emulator for simulator in (simulate, jumping))
     mask = test.mask
     still, moved = (np.sqrt(np.diag(scatter(e, mask))[-13:]) for e in (calm, wild))
     # effects are simulated at a node, which does not jump: two of three nudges differ by 40 N from it, and the grid
@@ -114,6 +116,15 @@ def test_simulations_that_jump_widen_the_metric():
 def test_a_baseline_that_cannot_be_simulated_is_no_verdict():
     with pytest.raises(ConvergenceError, match="baseline"):
         found(measured(), simulator=lambda runs: ["no equilibrium"] * len(runs))
+
+
+def test_an_explanation_that_the_grid_does_not_reach_is_no_cause():
+    """[start] in other units: the grid follows as far as it may."""
+    start, rng = (START[0] / 30, START[1]), np.random.default_rng(0)
+    d = diagnose(measured(rng=np.random.default_rng(2)), ABSCISSAE, simulate, start, entry(), rng, ["cmod_gain"], FEW)
+    assert (d.verdict.kind, d.verdict.named) == ("outside the library", ())
+    assert "edge of the grid" in d.verdict.reason
+    assert "units" in d.verdict.reason
 
 
 @pytest.mark.parametrize("lacking", ["field", "load"])
@@ -149,8 +160,8 @@ def test_an_effect_outside_the_library_is_not_pinned_on_another():
     assert d.verdict.kind != "cause" or d.verdict.named == ("lens_distortion",)
 
 
-def test_what_other_places_of_the_lattice_change_widens_the_metric():
-    """A load that is 60 N higher on every other place of the lattice counts with the weight that the entry gives it."""
+def test_other_places_of_the_lattice_move_the_model_to_their_mean_and_widen_the_metric_by_its_error():
+    """A load that is 60 N higher on the other three places: 45 N in the mean, which is known to 15 N."""
 
     def placed(runs):
         moved = [60.0 * (run.placement != (0.0, 0.0)) for run in runs]
@@ -158,8 +169,48 @@ def test_what_other_places_of_the_lattice_change_widens_the_metric():
 
     test, plain_entry = measured(rng=np.random.default_rng(2)), entry()
     start, grid = np.array(START), Design(START, FEW, FEW)
-    emulator, _ = baseline(test, ABSCISSAE, placed, grid, plain_entry)
-    emulator = with_placements(emulator, placed, start)
+    alone, _ = baseline(test, ABSCISSAE, placed, grid, plain_entry)
+    emulator = with_placements(alone, placed, start)
     counting = replace(plain_entry, discrepancy=replace(plain_entry.discrepancy, placements=0.5))
     before, after = (np.diag(weighed(test, emulator, e)[1].metric.covariance)[-13:] for e in (plain_entry, counting))
-    assert np.allclose(after - before, 0.5 * 60.0**2)
+    assert np.allclose(after - before, 0.5 * 15.0**2)
+    for names, amplitudes in (((), np.zeros(0)), (("sync_offset_s",), np.zeros(1)), (("sync_offset_s",), np.ones(1))):
+        mean, one = (e.reading(start, names, amplitudes) for e in (emulator, alone))
+        np.testing.assert_allclose(mean.load - one.load, 45.0)
+        np.testing.assert_allclose(mean.field, one.field)
+    again = emulator.confirmed(start, simulate([Run(*START)])[0].flat())  # what one place says does not undo the mean
+    np.testing.assert_allclose(again.reading(start).load - alone.reading(start).load, 45.0)
+
+
+def test_a_fragment_that_comes_off_does_not_count_as_what_an_effect_does():
+    """A point that flies 20 µm off in simulations with an effect: the effect is what the other points show."""
+    whole = found(measured(rng=np.random.default_rng(2)), ["modulus"]).emulator
+    signature, points = whole.signatures["modulus"], len(whole.sight.points)
+    changes = []
+    for row in signature.changes:
+        one = split(row, ABSCISSAE, points)
+        one.field[5:, 6, 0] -= 20e-6
+        changes.append(one.flat())
+    broken = replace(whole, signatures={"modulus": replace(signature, changes=np.array(changes))})
+    clean, odd = (e.reading(np.array(START), ("modulus",), np.array([0.2])) for e in (whole, broken))
+    assert np.abs(odd.field - clean.field).max() < 0.1e-6  # weights fall with the distance, but not to zero
+    np.testing.assert_allclose(odd.load, clean.load)
+
+
+def test_what_does_not_grow_in_proportion_to_an_effect_is_doubted():
+    """A straight signature is believed; of one that is alike for both signs, as when a crack turns off, nothing."""
+    values, line = np.array([-0.3, 0.6]), np.array([1.0, -2.0])
+    straight = Signature(values, np.outer(values, line))
+    assert np.allclose(straight.curved(0.25), 0.0)
+    assert np.allclose(straight.at(0.25), 0.25 * line)
+    even = Signature(np.array([-0.3, 0.3]), np.array([line, line]))
+    assert np.allclose(even.curved(0.3), line)
+    assert np.allclose(even.curved(0.15), line / 4)  # a parabola
+    mixed = Signature(np.array([-0.3, 0.3]), np.array([0.0 * line, line]))
+    assert np.allclose(mixed.curved(0.3), line / 2)
+
+
+def test_an_effect_is_seen_less_where_it_is_doubted():
+    change, doubt = np.array([3.0, 4.0]), np.array([[0.0], [2.0]])
+    assert np.allclose(doubted(change, doubt), (3.0, 4.0 / np.sqrt(5)))
+    assert np.allclose(doubted(change, None), change)

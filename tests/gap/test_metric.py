@@ -33,3 +33,19 @@ def test_a_draw_has_one_scale_for_all_its_waves():
     assert np.mean(one**4) == pytest.approx(3 + 6 / 16, abs=0.1)  # some ten standard errors of the sixth moment's size
     flat = np.linalg.svd(drawn[:, :2000], compute_uv=False)
     assert flat[2] < 1e-3 * flat[1]  # two waves make up all
+
+
+def test_a_doubted_direction_counts_as_a_wider_covariance():
+    """Against the density of the whole matrix, of known and of unknown scale."""
+    rng, n = np.random.default_rng(5), 6
+    root = rng.standard_normal((n, n))
+    sigma, own = root @ root.T + np.eye(n), 0.5 * np.eye(n)
+    doubt, residual = rng.standard_normal((n, 2)), rng.standard_normal(n)
+    for metric in (Metric(sigma), Metric(sigma, sigma - own, 3.0)):
+        wider = Metric(sigma + doubt @ doubt.T, metric.uncertain, metric.tail)
+        ours = [metric.log_likelihood(metric.white(k * residual), metric.white(doubt)) for k in (1.0, 3.0)]
+        whole = [wider.log_likelihood(wider.white(k * residual)) for k in (1.0, 3.0)]
+        assert ours[1] - ours[0] == pytest.approx(whole[1] - whole[0])  # constants of the metrics differ
+    assert metric.log_likelihood(metric.white(residual), np.zeros((n, 0))) == metric.log_likelihood(
+        metric.white(residual)
+    )

@@ -76,6 +76,18 @@ def test_an_entry_learnt_from_eight_fits_those_left_out():
     assert np.median(size) == pytest.approx(1.0, rel=0.5)  # eight specimens of unequal scale
 
 
+def test_a_mode_that_is_too_narrow_is_widened_and_only_that():
+    """Amplitudes, and the specimens' own waves, in which a mode differs."""
+    wider = np.ones(len(ALL))
+    wider[-1] = 1.5
+    one = replace(discrepancy(), waves=np.ones((2, len(ALL), KNOTS.size)), empirical=0.3)
+    before, after = (d.of_modes(sight(), SCALE) for d in (one, one.widened(wider)))
+    cut = -sight().cmod.size
+    np.testing.assert_allclose(after[cut:, cut:], 1.5**2 * before[cut:, cut:])
+    np.testing.assert_allclose(after[:cut, :cut], before[:cut, :cut])
+    np.testing.assert_allclose(after[:cut, cut:], 1.5 * before[:cut, cut:])
+
+
 def test_common_waves_are_not_spread_over_all_shapes():
     """What all specimens have alike is expected of the next one; what none has is not."""
     common = np.zeros((1, len(ALL), KNOTS.size))

@@ -13,7 +13,7 @@ class AggregateStrength(PhysicsEffect):
 
     name = "aggregate_strength"
     says = "the stone is stronger than was said"
-    magnitude = Magnitude(-0.6, 0.6, 0.25, "1")
+    magnitude = Magnitude(-0.6, 0.6, 0.3, "1")
     remedy = "count broken stones on the crack faces; test the stone by itself"
 
     def change(self, value: float, plan: Plan) -> Plan:

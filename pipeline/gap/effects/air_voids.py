@@ -13,7 +13,7 @@ class AirVoids(PhysicsEffect):
 
     name = "air_voids"
     says = "there are air voids that the image does not show"
-    magnitude = Magnitude(0.0, 0.12, 0.05, "1")
+    magnitude = Magnitude(0.0, 0.12, 0.06, "1")
     remedy = "measure the air voids by weighing under water, or by CT"
 
     def change(self, value: float, plan: Plan) -> Plan:

@@ -13,7 +13,7 @@ class CmodGain(MeasurementEffect):
 
     name = "cmod_gain"
     says = "the clip gauge reads too much"
-    magnitude = Magnitude(-0.15, 0.15, 0.04, "1")
+    magnitude = Magnitude(-0.15, 0.15, 0.075, "1")
     remedy = "check the clip gauge on a micrometer; compare it with the opening in the images"
 
     def field_at(self, value: np.ndarray, sight: Sight, cmod: np.ndarray) -> np.ndarray:

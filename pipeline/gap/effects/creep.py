@@ -13,7 +13,7 @@ class Creep(PhysicsEffect):
 
     name = "creep"
     says = "the mastic creeps"
-    magnitude = Magnitude(0.0, 2.0, 0.7, "1")
+    magnitude = Magnitude(0.0, 2.0, 1.0, "1")
     remedy = "an unload–reload loop, a second loading rate, or a creep test (creep.csv)"
 
     def change(self, value: float, plan: Plan) -> Plan:

@@ -14,7 +14,7 @@ class Drift(MeasurementEffect):
 
     name = "drift_um_per_min"
     says = "specimen and camera drift against each other"
-    magnitude = Magnitude(0.0, 30.0, 6.0, "µm/min", directions=2)
+    magnitude = Magnitude(0.0, 30.0, 15.0, "µm/min", directions=2)
     remedy = "film the specimen unloaded for as long as a test, or a fixed mark beside it"
     belongs = "test"
 

@@ -14,7 +14,7 @@ class Eccentricity(PhysicsEffect):
 
     name = "eccentricity_mm"
     says = "the load acts beside the notch line"
-    magnitude = Magnitude(-8.0, 8.0, 2.0, "mm")
+    magnitude = Magnitude(-8.0, 8.0, 4.0, "mm")
     remedy = "measure where the platen touches; film both supports"
     belongs = "test"
 

@@ -14,7 +14,7 @@ class FixtureCompliance(MeasurementEffect):
 
     name = "fixture_compliance_um_per_kn"
     says = "supports or pins give way under load"
-    magnitude = Magnitude(0.0, 60.0, 20.0, "µm/kN")
+    magnitude = Magnitude(0.0, 60.0, 30.0, "µm/kN")
     remedy = "measure points near the supports, or the fixture under a stiff dummy"
 
     def distort(self, value: np.ndarray, sight: Sight, reading: Reading) -> Reading:

@@ -13,7 +13,7 @@ class InterfaceRatio(PhysicsEffect):
 
     name = "interface_ratio"
     says = "interfaces are stronger than was said"
-    magnitude = Magnitude(-0.5, 0.5, 0.2, "1")
+    magnitude = Magnitude(-0.5, 0.5, 0.25, "1")
     remedy = "look for bare stone on the crack faces; pull-off test of mastic on stone"
 
     def change(self, value: float, plan: Plan) -> Plan:

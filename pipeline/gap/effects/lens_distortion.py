@@ -17,7 +17,7 @@ class LensDistortion(MeasurementEffect):
 
     name = "lens_distortion"
     says = "the lens distorts radially"
-    magnitude = Magnitude(-0.02, 0.02, 0.005, "1")
+    magnitude = Magnitude(-0.02, 0.02, 0.01, "1")
     remedy = "photograph a calibration plate with the same lens and distance"
 
     def distort(self, value: np.ndarray, sight: Sight, reading: Reading) -> Reading:

@@ -13,7 +13,7 @@ class LoadGain(MeasurementEffect):
 
     name = "load_gain"
     says = "the load cell reads too much"
-    magnitude = Magnitude(-0.15, 0.15, 0.04, "1")
+    magnitude = Magnitude(-0.15, 0.15, 0.075, "1")
     equivalents = ("thickness", "all moduli and strengths together")
     remedy = "check the load cell with a dead weight and the thickness with a caliper"
 

@@ -13,7 +13,7 @@ class Magnification(MeasurementEffect):
 
     name = "magnification"
     says = "the picture grows during the test (out-of-plane motion)"
-    magnitude = Magnitude(-0.003, 0.003, 0.0007, "1")
+    magnitude = Magnitude(-0.003, 0.003, 0.0015, "1")
     remedy = "film an unloaded plate beside the specimen, or use a second camera or a telecentric lens"
     belongs = "test"
 

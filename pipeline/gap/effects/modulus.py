@@ -13,7 +13,7 @@ class Modulus(PhysicsEffect):
 
     name = "modulus"
     says = "the modulus of the mastic is off (temperature)"
-    magnitude = Magnitude(-0.5, 0.5, 0.15, "1")
+    magnitude = Magnitude(-0.5, 0.5, 0.25, "1")
     remedy = "measure the modulus at the temperature of the test, or log the temperature in a dummy specimen"
 
     def change(self, value: float, plan: Plan) -> Plan:

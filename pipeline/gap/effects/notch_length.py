@@ -15,7 +15,7 @@ class NotchLength(PhysicsEffect):
 
     name = "notch_length_mm"
     says = "the notch is longer than nominal"
-    magnitude = Magnitude(-4.0, 4.0, 1.0, "mm")
+    magnitude = Magnitude(-4.0, 4.0, 2.0, "mm")
     remedy = "measure the notch on the broken halves"
     belongs = "test"
 

@@ -13,7 +13,7 @@ class RateLaw(PhysicsEffect):
 
     name = "rate_law_per_decade"
     says = "strength rises with the rate of opening"
-    magnitude = Magnitude(0.0, 0.3, 0.08, "1/decade")
+    magnitude = Magnitude(0.0, 0.3, 0.15, "1/decade")
     remedy = "a second test at a tenth of the rate"
 
     def change(self, value: float, plan: Plan) -> Plan:

@@ -13,7 +13,7 @@ class ShearStrengthRatio(PhysicsEffect):
 
     name = "shear_strength_ratio"
     says = "bonds are stronger in shear than was said"
-    magnitude = Magnitude(-0.6, 0.6, 0.25, "1")
+    magnitude = Magnitude(-0.6, 0.6, 0.3, "1")
     remedy = "a mixed-mode test of the same mixture"
 
     def change(self, value: float, plan: Plan) -> Plan:

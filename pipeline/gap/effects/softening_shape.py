@@ -14,7 +14,7 @@ class SofteningShape(PhysicsEffect):
 
     name = "softening_shape"
     says = "softening has a steep beginning and a long tail"
-    magnitude = Magnitude(0.0, 1.0, 0.4, "1")
+    magnitude = Magnitude(0.0, 1.0, 0.5, "1")
     remedy = "test farther into the tail, or measure tensile strength on its own"
 
     def change(self, value: float, plan: Plan) -> Plan:

@@ -13,7 +13,7 @@ class SupportFriction(PhysicsEffect):
 
     name = "support_friction"
     says = "supports or pins rub"
-    magnitude = Magnitude(0.0, 0.5, 0.15, "1")
+    magnitude = Magnitude(0.0, 0.5, 0.25, "1")
     remedy = "use rollers or needle bearings; an unload–reload loop shows twice the friction"
     belongs = "set-up"
 

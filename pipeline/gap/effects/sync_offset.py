@@ -13,7 +13,7 @@ class SyncOffset(MeasurementEffect):
 
     name = "sync_offset_s"
     says = "frames are late against the load record"
-    magnitude = Magnitude(-4.0, 4.0, 1.0, "s")
+    magnitude = Magnitude(-4.0, 4.0, 2.0, "s")
     remedy = "show the machine's trigger in the pictures, or film the loading's start at a higher rate"
     belongs = "test"
 

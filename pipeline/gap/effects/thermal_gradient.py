@@ -29,7 +29,7 @@ class ThermalGradient(PhysicsEffect):
 
     name = "thermal_gradient"
     says = "temperature changes over the depth of the specimen"
-    magnitude = Magnitude(-0.6, 0.6, 0.2, "1")
+    magnitude = Magnitude(-0.6, 0.6, 0.3, "1")
     remedy = "log the temperature at mouth and back of a dummy specimen; condition longer"
     belongs = "test"
 

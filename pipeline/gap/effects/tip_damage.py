@@ -14,7 +14,7 @@ class TipDamage(PhysicsEffect):
 
     name = "tip_damage"
     says = "the material at the notch tip is damaged before the test"
-    magnitude = Magnitude(0.0, 0.95, 0.3, "1")
+    magnitude = Magnitude(0.0, 0.95, 0.475, "1")
     remedy = "look at the tip under a microscope or in CT; polish or pre-crack it"
     belongs = "test"
 
