@@ -214,3 +214,15 @@ def test_an_effect_is_seen_less_where_it_is_doubted():
     change, doubt = np.array([3.0, 4.0]), np.array([[0.0], [2.0]])
     assert np.allclose(doubted(change, doubt), (3.0, 4.0 / np.sqrt(5)))
     assert np.allclose(doubted(change, None), change)
+
+
+def test_what_specimens_seem_to_have_widens_the_metric_by_its_signature():
+    test, plain = measured(rng=np.random.default_rng(2)), entry()
+    emulator = found(test, ["modulus"]).emulator
+    seeming = replace(plain, apparent={"modulus": 0.1, "creep": 5.0})  # of what was not simulated nothing is known
+    before, after = (weighed(test, emulator, e)[1].metric.covariance for e in (plain, seeming))
+    slope = emulator.slopes(test.mask)["modulus"]
+    np.testing.assert_allclose(after - before, 0.01 * np.outer(slope, slope), atol=1e-9 * np.abs(before).max())
+    small = emulator.reading(np.array(START), ("modulus",), np.array([1e-3])) - emulator.reading(np.array(START))
+    # the line through two values is the change by a small one, but for the curve between them
+    assert np.linalg.norm(small.load - 1e-3 * slope[-13:]) < 0.3 * np.linalg.norm(small.load)
