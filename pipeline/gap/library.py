@@ -94,9 +94,9 @@ class Entry:
                 f"{np.expm1(strength):+.0%} ± {s_std:.0%} and delta_max {np.expm1(opening):+.0%} ± {o_std:.0%} off the "
                 "truth: the parameters are known no better"
             )
-        if self.tests < ENOUGH:
-            known = f"on {self.tests} blind tests only" if self.tests else "not on blind tests yet"
-            found.append(f"probabilities are calibrated {known}: take them as too sure")
+        known = f"on {self.tests} virtual tests of one other engine" if self.tests else "on no tests yet"
+        few = " only" if 0 < self.tests < ENOUGH else ""
+        found.append(f"probabilities are calibrated {known}{few}: for a real specimen take them as too sure")
         return found
 
 
