@@ -67,7 +67,7 @@ def rough_dense_solve(stiffness: np.ndarray) -> Solve:
         factor = linalg.cho_factor(single, lower=True, overwrite_a=True, check_finite=False)
     except linalg.LinAlgError:
         strength, shape = linalg.eigh(stiffness)
-        strength = np.maximum(strength, SMALLEST * strength[-1])
+        strength = np.maximum(strength, SMALLEST * np.abs(strength).max() or 1.0)
         return lambda right: shape @ (shape.T @ right / strength)
     return lambda right: linalg.cho_solve(factor, right.astype(np.float32), check_finite=False).astype(float)
 

@@ -94,6 +94,8 @@ class Emulator:
         known = np.isfinite(self.values).all(axis=(0, 1))
         for signature in self.signatures.values():
             known &= np.isfinite(signature.changes).all(axis=0)
+        for change in self.placed:
+            known &= np.isfinite(change)
         return known & np.isfinite(self.offset)
 
     @cached_property

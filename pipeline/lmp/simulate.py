@@ -16,7 +16,6 @@ from pipeline.lmp.deck import DECK, write_deck
 from pipeline.lmp.output import read_curve, read_frames, read_reached
 from pipeline.lmp.plugin import open_lammps
 
-RULE = 2  # of loading (fix cohesive/drive): simulations by another one are not taken for these
 ROOM = "; make room there, raise its limits (ulimit -f), or let TMPDIR name another folder"
 ENERGIES = ("external", "stored", "dissipated", "kinetic", "damping")
 

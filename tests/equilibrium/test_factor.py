@@ -30,3 +30,9 @@ def test_a_matrix_that_round_off_makes_indefinite_still_measures_steps(smallest)
     assert np.linalg.eigvalsh(0.5 * (inverse + inverse.T)).min() > 0
     strong = np.linalg.eigh(matrix)[1][:, 2:]  # what is well determined is solved as by any other way
     np.testing.assert_allclose(strong.T @ inverse @ strong, np.diag([1.0, 1 / 3]), atol=1e-6)
+
+
+def test_even_a_matrix_of_nothing_measures_steps():
+    for matrix in (np.zeros((2, 2)), -1e-9 * np.eye(2)):
+        inverse = np.column_stack([rough_dense_solve(matrix)(column) for column in np.eye(2)])
+        assert np.linalg.eigvalsh(inverse).min() > 0
