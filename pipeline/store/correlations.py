@@ -18,7 +18,7 @@ from pipeline.dic.crack import Crack
 from pipeline.dic.grid import Grid
 from pipeline.store.atomic import refused, write_atomically
 from pipeline.store.layouts import DIC_FRAME
-from pipeline.store.schema import opened
+from pipeline.store.schema import opened, text_of
 
 log = logging.getLogger("pipeline.store")
 
@@ -108,7 +108,7 @@ class FrameStore:
         """What became of the points of a frame (n,), without reading the rest; refuses as `need` does."""
         try:
             with opened(self.path(number)) as file:
-                if file.attrs.get("key") == key:
+                if text_of(file, "key") == key:
                     return file["status"][()]
         except (OSError, KeyError, RuntimeError):  # also MissingFileError and StoreError
             pass
@@ -129,7 +129,7 @@ class FrameStore:
         """The key that a file says it has, without reading the rest."""
         try:
             with opened(self.path(number)) as file:
-                return str(file.attrs.get("key"))
+                return text_of(file, "key")
         except OSError:  # also MissingFileError and StoreError
             return None
 

@@ -155,9 +155,18 @@ def _damaged(path: Path, error: Exception) -> StoreError:
     return StoreError(f"{path.name}: {reason} ({path.stat().st_size} bytes): make or copy it again")
 
 
+def text_of(file: h5py.File, name: str) -> str | None:
+    """The text of an attribute, of fixed or of variable length; None where there is none, StoreError where damaged."""
+    value = file.attrs.get(name)
+    try:
+        return value.decode() if isinstance(value, bytes) else value
+    except UnicodeDecodeError as error:
+        raise StoreError(f"{file.filename}: attribute {name} is damaged: make or copy the file again") from error
+
+
 def _put(file: h5py.File, entry: Entry, value: Any) -> None:
     if entry.shape is None:
-        file.attrs[entry.name] = str(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
+        file.attrs[entry.name] = _encoded(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
         return
     array = _encoded(value) if entry.dtype == "str" else np.asarray(value, entry.dtype)
     packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if array.size else {}
@@ -167,8 +176,10 @@ def _put(file: h5py.File, entry: Entry, value: Any) -> None:
 
 def _get(file: h5py.File, entry: Entry) -> Any:
     if entry.shape is None:
+        if entry.dtype == "str":
+            return text_of(file, entry.name)
         value = file.attrs.get(entry.name)
-        return value if value is None or entry.dtype == "str" else np.dtype(entry.dtype).type(value).item()
+        return value if value is None else np.dtype(entry.dtype).type(value).item()
     if entry.name not in file:
         return None
     if entry.dtype == "str":
@@ -177,7 +188,10 @@ def _get(file: h5py.File, entry: Entry) -> Any:
 
 
 def _encoded(value: Any) -> np.ndarray:
-    """Texts as UTF-8 of one length, which is packed and checked as numbers are."""
+    """Texts as UTF-8 of one length, which is packed and checked as numbers are.
+
+    Texts of variable length lie in a heap of the file, and HDF5 reads a damaged one for ever.
+    """
     texts = [str(text).encode() for text in np.ravel(np.asarray(value, object))]
     length = max(map(len, texts), default=1) or 1
     return np.array(texts, h5py.string_dtype("utf-8", length)).reshape(np.shape(value))
