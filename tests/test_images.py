@@ -1,32 +1,25 @@
-"""From speckle images to results, by the commands: against known truth, stopped and taken up again, refused."""
+"""From speckle images to results, by the commands: against known truth, and no image measured twice."""
 
 from __future__ import annotations
 
 import json
-import re
 import shutil
-import signal
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from helpers.bundles import edit
-from helpers.commands import end_group, start, wait_for
-from helpers.films import MM_PER_PX, STEP_PX, make_film
+from helpers.commands import run
+from helpers.films import MM_PER_PX, STEP_PX
 from scipy.spatial import cKDTree
-from typer.testing import CliRunner, Result
 
-from pipeline.cli import app
 from pipeline.core.field import DisplacementField
 from pipeline.dic.gauge import opening
-from pipeline.execution.progress import Silent
 from pipeline.store.bundle import read_bundle
 from pipeline.store.fields import read_fields, write_fields
 from pipeline.store.layouts import DIC, IDENTIFY
 from pipeline.store.results import read_arrays, read_result
-from pipeline.study import dic as study
 
 PX = MM_PER_PX * 1e-3  # m
 NEAR = 12 * PX  # m; as the contract of the correlation counts what is near a crack
@@ -36,45 +29,13 @@ KEYS = {
 }
 
 
-def run(*line: object) -> Result:
-    """The command in this process."""
-    return CliRunner().invoke(app, [str(word) for word in line], env={"COLUMNS": "200"})
-
-
-@pytest.fixture(scope="module")
-def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A virtual test in images, which is only copied."""
-    return make_film(tmp_path_factory.mktemp("films") / "film")
-
-
 @pytest.fixture(scope="module")
 def measured(film: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the command makes of it."""
+    """What the command makes of the film."""
     out = tmp_path_factory.mktemp("measured") / "out"
     done = run("dic", film, "-o", out, "--workers", "1")
     assert done.exit_code == 0, done.stderr
     return out
-
-
-@pytest.fixture(scope="module")
-def short(film: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The first twelve images of it, for what must be measured several times."""
-    bundle = shutil.copytree(film, tmp_path_factory.mktemp("short") / "film")
-    for image in sorted((bundle / "images").iterdir())[12:]:
-        image.unlink()
-    rows = (bundle / "frames.csv").read_text("utf-8").splitlines()
-    (bundle / "frames.csv").write_text("\n".join(rows[:13]) + "\n", "utf-8")
-    edit(bundle, sync_offset_s="0.25")
-    return bundle
-
-
-@pytest.fixture(scope="module")
-def undisturbed(short: Path, tmp_path_factory: pytest.TempPathFactory) -> DisplacementField:
-    """The fields of these when nothing stopped the command."""
-    out = tmp_path_factory.mktemp("undisturbed") / "out"
-    done = run("dic", short, "-o", out, "--workers", "1")
-    assert done.exit_code == 0, done.stderr
-    return read_fields(out / "fields.h5")
 
 
 @pytest.fixture(scope="module")
@@ -218,57 +179,6 @@ def test_without_a_record_the_camera_keeps_its_own_time(film, measured, tmp_path
     np.testing.assert_array_equal(read_fields(out / "fields.h5").abscissa, read_bundle(bundle).frame_time)
 
 
-class Interrupt(Silent):
-    """Stops after so many images, as Ctrl-C does."""
-
-    def __init__(self, after: int) -> None:
-        self.left = after
-
-    def done(self, key: str) -> None:
-        """Count down."""
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
-
-
-def test_a_stopped_run_goes_on_where_it_stopped(short, undisturbed, tmp_path):
-    out = tmp_path / "out"
-    with pytest.raises(KeyboardInterrupt):
-        study.dic(short, out, workers=1, progress=Interrupt(7))
-    assert len(list((out / "frames").glob("*.h5"))) == 7
-    (out / "frames" / "00007.h5").write_bytes(b"cut short")  # as by a full disk: it is correlated again
-    done = run("dic", short, "-o", out, "--workers", "1")
-    assert done.exit_code == 0, done.stderr
-    assert "6 of 11 images are kept" in done.stderr
-    again = read_fields(out / "fields.h5")
-    np.testing.assert_array_equal(again.valid, undisturbed.valid)
-    np.testing.assert_array_equal(
-        again.displacement, undisturbed.displacement
-    )  # to the last bit: as kept, so gone on from
-
-
-@pytest.mark.parametrize(("how", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
-def test_a_stopped_process_leaves_whole_frames(short, undisturbed, tmp_path, how, code):
-    out = tmp_path / "out"
-    process = start("dic", short, "-o", out, "--workers", "1", scratch=tmp_path / "scratch")
-    try:
-        wait_for(lambda: len(list(out.glob("frames/0*.h5"))) >= 3)
-        process.send_signal(how)
-        told = process.communicate(timeout=60)[1]
-    finally:
-        end_group(process)
-    assert process.returncode == code
-    assert how == signal.SIGKILL or "give the same command again" in told
-    kept = {path: path.stat().st_mtime_ns for path in out.glob("frames/0*.h5")}
-    assert not (out / "result.json").exists()
-    done = run("dic", short, "-o", out, "--workers", "1")
-    assert done.exit_code == 0, done.stderr
-    assert f"{len(kept)} of 11 images are kept" in done.stderr
-    assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    again = read_fields(out / "fields.h5")
-    np.testing.assert_array_equal(again.displacement, undisturbed.displacement)  # to the last bit
-
-
 def test_images_identify_as_the_exact_fields_do(film, measured, both, tmp_path):
     config, known = tmp_path / "run.toml", tmp_path / "exact.h5"
     config.write_text("recentring_count = 0\ngrid = [0.85, 1.0, 1.15]\n")
@@ -295,111 +205,6 @@ def test_images_identify_as_the_exact_fields_do(film, measured, both, tmp_path):
     field = read_arrays(tmp_path / "exact", IDENTIFY)["grid/displacement_m"]
     apart = np.sqrt(np.nansum((field - field[1, 1]) ** 2, axis=(2, 3, 4)))  # how much two nodes differ, m
     assert np.all(np.abs(off - off[1, 1]) <= 4 * 2 * noise * apart)  # four deviations
-
-
-SPOILT = {
-    "no image": (lambda b: [p.unlink() for p in (b / "images").iterdir()], "images/: holds no PNG or TIFF image"),
-    "no images": (lambda b: (shutil.rmtree(b / "images"), (b / "frames.csv").unlink()), "holds no speckle images"),
-    "one missing": (lambda b: (b / "images" / "frame_0007.png").unlink(), "has 29 rows for 28 images"),
-    "another size": (
-        lambda b: cv2.imwrite(str(b / "images" / "frame_0005.png"), np.eye(90, dtype=np.uint8) * 200),
-        "frame_0005.png: has 90 × 90 pixels, the first image",
-    ),
-    "blank": (lambda b: repaint(b / "images" / "frame_0004.png", lambda p: 0 * p + 77), "frame_0004.png: "),
-    "other speckle": (
-        lambda b: repaint(b / "images" / "frame_0003.png", lambda p: np.ascontiguousarray(p[::-1, ::-1])),
-        "frame_0003.png: ",
-    ),
-    "cut short": (
-        lambda b: (b / "images" / "frame_0002.png").write_bytes((b / "images" / "frame_0002.png").read_bytes()[:999]),
-        "frame_0002.png",
-    ),
-    "no scale": (lambda b: edit(b, mm_per_px="nan"), "mm_per_px"),
-    "no camera": (lambda b: drop_camera(b), "[camera] is missing"),
-    "another clock": (lambda b: shift(b / "frames.csv", 9000.0), "do not overlap those of load_cmod.csv"),
-    "backwards": (lambda b: shift(b / "frames.csv", 0.0, turn=-1.0), "must be larger than"),
-}
-
-
-def repaint(path: Path, how) -> None:
-    """Change the pixels of an image."""
-    cv2.imwrite(str(path), how(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)))
-
-
-def drop_camera(bundle: Path) -> None:
-    """Take [camera] out of the settings."""
-    path = bundle / "experiment.toml"
-    path.write_text(re.sub(r"(?ms)^\[camera\].*?(?=^\[)", "", path.read_text("utf-8")), "utf-8")
-
-
-def shift(path: Path, by: float, turn: float = 1.0) -> None:
-    """Move the times of frames.csv."""
-    head, *rows = path.read_text("utf-8").splitlines()
-    moved = [f"{name},{turn * float(time) + by:.6f}" for name, time in (row.split(",") for row in rows)]
-    path.write_text("\n".join([head, *moved]) + "\n", "utf-8")
-
-
-@pytest.mark.parametrize("how", SPOILT)
-def test_bad_images_are_one_clear_message(film, tmp_path, how):
-    bundle = shutil.copytree(film, tmp_path / "film")
-    spoil, told = SPOILT[how]
-    spoil(bundle)
-    done = run("dic", bundle, "-o", tmp_path / "out", "--workers", "1")
-    assert (done.exit_code, done.stdout) == (1, "")
-    assert told in done.stderr
-    assert done.stderr.count("cohesive-bpm: ") == 1
-    assert "fault of the program" not in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        (("--objective", "load", "--levelling"), "objective = load compares none"),
-        (("--grid", "0.9,1,1.1", "--levelling", "--objective", "fields"), "[camera]"),
-    ],
-)
-def test_levelling_is_obeyed_or_refused(film, tmp_path, line, told):
-    bundle = shutil.copytree(film, tmp_path / "film")
-    drop_camera(bundle)
-    fields = ("--fields", film / "truth.h5")
-    done = run("identify", bundle, "-o", tmp_path / "out", "--engine", "equilibrium", *fields, *line)
-    assert done.exit_code == 1
-    assert told in done.stderr
-    config = tmp_path / "run.toml"
-    config.write_text("levelling = true\n")
-    line = tuple(word for word in line if word != "--levelling")
-    again = run(
-        "identify", bundle, "-o", tmp_path / "out", "--engine", "equilibrium", *fields, *line, "--config", config
-    )
-    assert again.stderr == done.stderr
-
-
-@pytest.mark.parametrize("option", [("--subset", "24"), ("--subset", "3"), ("--step", "0"), ("--workers", "0")])
-def test_impossible_settings_are_wrong_usage(film, tmp_path, option):
-    assert run("dic", film, "-o", tmp_path / "out", *option).exit_code == 2
-
-
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        (("--images", "--noise-px", "0.02"), "--noise-px belongs to displacement fields"),
-        (("--noise-grey", "3"), "--noise-grey belongs to speckle images: add --images"),
-        (("--camera-mm-per-px", "0.1"), "--camera-mm-per-px belongs to speckle images"),
-    ],
-)
-def test_noise_of_the_other_kind_is_refused(tmp_path, line, told):
-    done = run("virtual-test", tmp_path / "made", *line)
-    assert done.exit_code == 1
-    assert told in done.stderr
-    assert not (tmp_path / "made").exists()
-
-
-def test_a_region_beyond_the_picture_is_refused(film, tmp_path):
-    bundle = shutil.copytree(film, tmp_path / "film")
-    edit(bundle, roi_px="[0, 0, 5000, 100]")
-    done = run("dic", bundle, "-o", tmp_path / "out")
-    assert done.exit_code == 1
-    assert "reaches outside the picture" in done.stderr
 
 
 def test_the_gauge_finds_the_record_in_exact_fields(film):

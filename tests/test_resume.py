@@ -177,7 +177,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     disk = tmp_path / "disk"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], capture_output=True).returncode:
-        pytest.skip("nothing can be mounted here; tests/test_bad_input.py limits file sizes instead")
+        pytest.skip("nothing can be mounted here; tests/test_unwritable_places.py limits file sizes instead")
     yield disk
     subprocess.run(["umount", disk], check=True)
 

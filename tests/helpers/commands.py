@@ -1,4 +1,4 @@
-"""The installed command as a process of its own, with a scratch folder that can be looked into."""
+"""The command in this process, or as a process of its own with a scratch folder that can be looked into."""
 
 from __future__ import annotations
 
@@ -9,6 +9,15 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+from typer.testing import CliRunner, Result
+
+from pipeline.cli import app
+
+
+def run(*line: object) -> Result:
+    """The command in this process."""
+    return CliRunner().invoke(app, [str(word) for word in line], env={"COLUMNS": "200"})
 
 
 def start(*line: object, scratch: Path, before: Callable[[], None] | None = None) -> subprocess.Popen[str]:

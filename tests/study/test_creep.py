@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from helpers.commands import run
 
-from pipeline.cli import app
 from pipeline.core.errors import InputError
 from pipeline.materials.burgers import Burgers
 from pipeline.materials.kelvin_chain import KelvinChain
@@ -30,10 +29,6 @@ MASTIC = Burgers(d1=1e-10, d2=0.7e-10, eta1=3e12, tau2=80.0)
 LEVELS = np.array([-24.0, -12, 0])
 LAW = Wlf(15.0, 120.0, 261.15)
 CHAIN = KelvinChain(5e-11, 1e-14, np.geomspace(0.1, 3, 8) * 1e-10, np.geomspace(0.03, 3e4, 8))
-
-
-def run(*line: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in line], env={"COLUMNS": "200"})
 
 
 def one_temperature(folder: Path, noise: float = 0.0) -> Path:

@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.bundles import make_bundle
-from typer.testing import CliRunner, Result
+from helpers.commands import run
 
-from pipeline.cli import app
 from pipeline.store.bundle import read_bundle
 from pipeline.study import identify, library
 from pipeline.study.comparison import pair
@@ -44,10 +43,6 @@ RESULT = {
     "accepted": True,
     "status": "accepted",
 }
-
-
-def run(*line: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in line], env={"COLUMNS": "200"})
 
 
 def result(folder: Path, **changes: object) -> Path:
