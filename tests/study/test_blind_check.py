@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.truth_table import row
 
 from pipeline.core.errors import ConvergenceError, InputError, StoreError
 from pipeline.store.bundle import read_bundle
@@ -27,14 +28,6 @@ from pipeline.study.blind_check.run import replicates, run
 from pipeline.study.blind_check.seal import SEAL, VERDICTS, file_digests, lock, salted, unlock, vault_of, write_seal
 
 FAKE = "study.fake_diagnosis:diagnose"
-
-
-def row(effect: str | None = None, specimen: str = "a", kind: str | None = None, **more: object) -> dict:
-    effects = {effect: 1.0} if effect else {}
-    return {
-        "specimen": specimen, "kind": kind or ("effect" if effect else "none"), "effects": effects,
-        "f_max_n": 100.0, "delta_max_m": 1e-4, "multiple": 2.0, **more,
-    }  # fmt: skip
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.truth_table import row
 
 from pipeline.gap.effects import library
 from pipeline.study.blind_check.goals import GOALS, goals_result
@@ -19,14 +20,6 @@ from pipeline.study.blind_check.score import (
 )
 
 EFFECTS = sorted(library())
-
-
-def row(effect: str | None = None, specimen: str = "a", kind: str | None = None, **more: object) -> dict:
-    effects = {effect: 1.0} if effect else {}
-    return {
-        "specimen": specimen, "kind": kind or ("effect" if effect else "none"), "effects": effects,
-        "f_max_n": 100.0, "delta_max_m": 1e-4, "multiple": 2.0, **more,
-    }  # fmt: skip
 
 
 def said(label: str, p: float = 0.9, verdict: str | None = None, **more: object) -> dict:
