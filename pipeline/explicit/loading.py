@@ -7,8 +7,8 @@ the error of the load is of second order in the rate (measured). Two numbers fol
   `PERIODS` periods of its lowest mode; for other accuracies the rate goes with their square root;
 - the *lag wanted*: fix cohesive/drive measures which share of the machine's power, at peak load, goes into
   motion and drag. Over the way of the machine that is a force by which the load is off; the rule keeps its root
-  mean square over CMOD below `LAG` times the accuracy times that of the load. The error of the load at single
-  stations is once to 1/`LAG` times that (measured).
+  mean square over CMOD below `LAG` times the accuracy times that of the load. Over the
+  stations the load was off by up to 1/`LAG` times that on ten specimens, by 0.33 to 2.43 times on four others.
 """
 
 from __future__ import annotations

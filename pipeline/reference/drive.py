@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 HASTE = 10.0  # how much faster the rate falls than it rises
-ERROR_PER_EXCESS = 2.25  # error of the load over the rms excess, at most (measured against the equilibrium engine)
+ERROR_PER_EXCESS = 2.25  # error of the load over the rms excess: the most of ten specimens, against equilibria
 JUMP = 3.0  # a crack jumps where the mouth opens by so much more than the machine's way has opened it so far
 
 

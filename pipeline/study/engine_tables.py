@@ -35,7 +35,7 @@ def engine_rows(trials: Sequence[Trial], accuracies: Sequence[float]) -> Iterato
         for accuracy in accuracies:
             run = lammps.solve(trial.with_accuracy(accuracy).problem)
             near = nearest_path(trial, run, accuracy, solve)
-            path = "jumps" if jumps else "" if near.path == 0 else f"strengths {near.path}"
+            path = ", ".join(["jump"] * jumps + [f"strengths {near.path}"] * (near.path > 0))
             back = "load {:.2%}, field {:.2%}".format(*apart(trial, run, turning)) if jumps else ""
             yield (
                 f"| {trial.name} | {accuracy:.1%} | {run.steps} | {run.seconds:.1f} | {near.curve:.2%} | "

@@ -19,6 +19,7 @@ from pipeline.study.specimens import section_trial
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarse particles, two speeds, and nothing but the comparison of LAMMPS with equilibrium."""
     monkeypatch.setattr(cross_check, "section_trial", lambda *_: section_trial("seb", 2.0, 1, 90.0))
+    # 10 % and 0.3 %: the ends of the series, whose errors a check compares, and enough for an order
     monkeypatch.setattr(cross_check, "ACCURACIES", (0.1, 0.003))
     monkeypatch.setattr(cross_check, "_specimens", lambda *_: [])
     for part in ("_steps", "_kinematics", "_scaling"):

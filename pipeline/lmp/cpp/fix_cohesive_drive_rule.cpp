@@ -15,7 +15,7 @@ using namespace LAMMPS_NS;
 
 // how much faster the rate falls than it rises
 static constexpr double HASTE = 10.0;
-// error of the load over the root mean square of the excess: up to so much (measured against the equilibrium engine)
+// error of the load over the root mean square of the excess: the most of ten specimens, against equilibria
 static constexpr double ERROR_PER_EXCESS = 2.25;
 // a crack jumps where the mouth opens by so much more than the machine's way has opened it so far
 static constexpr double JUMP = 3.0;
