@@ -32,8 +32,7 @@ class Answer:
 
     def scored(self, temperature: float) -> Scored:
         """Probabilities at a temperature."""
-        members = {label: 0 if label == NONE else label.count(" + ") + 1 for label in self.log_bayes}
-        return from_bayes(self.log_bayes, members, self.tested, temperature)
+        return from_bayes(self.log_bayes, self.tested, temperature)
 
     def log_score(self, temperature: float) -> float:
         """Logarithm of the probability of the truth."""

@@ -19,7 +19,8 @@ from pipeline.gap.library import Entry
 from pipeline.gap.noise import noise_bic
 from pipeline.gap.observation import Observation
 from pipeline.gap.response import Abscissae, Response
-from pipeline.gap.score import NONE, Scored, pairs, score
+from pipeline.gap.score import NONE, UNLISTED, Scored, pairs, score
+from pipeline.gap.unlisted import unlisted
 from pipeline.gap.verdict import Verdict, on_the_edge, verdict
 from pipeline.gap.weighing import fitted_to, weighed
 from pipeline.gap.where import Cell, where
@@ -64,7 +65,7 @@ class Diagnosis:
     observation : Observation, of the data that all simulations have
     emulator : Emulator
     data : Data
-    fits : label → Fitted; "none" among them
+    fits : label → Fitted; "none" and "outside the library" among them
     scored : Scored
     card : Card
     gate : Gate
@@ -144,7 +145,9 @@ def diagnose(
     entry = fitted_to(entry, observation, emulator, near)
     if entry.discrepancy.placements > 0:
         emulator = with_placements(emulator, counted, emulator.rounded(near.parameters))
-    emulator, untested = with_signatures(emulator, counted, emulator.rounded(near.parameters), wanted)
+    needed = sorted({*wanted, *entry.apparent})  # what specimens only seem to have counts whether it is tested or not
+    emulator, missing = with_signatures(emulator, counted, emulator.rounded(near.parameters), needed)
+    untested = {n: why for n, why in missing.items() if n in wanted}
     known = [n for n in wanted if n not in untested]
     look = _Look(*weighed(observation, emulator, entry), known, entry.temperature)
     fits, scored = look.judge(emulator)
@@ -302,10 +305,13 @@ class _Look:
     temperature: float
 
     def judge(self, emulator: Emulator, with_pairs: bool = True) -> tuple[dict[str, Fitted], Scored]:
-        """Fit none, every effect and the pairs of the best; score them."""
+        """Fit none, every effect, one that the library lacks, and the pairs of the best; score them."""
         fits = {NONE: self._fit(emulator, ())}
         for name in self.names:
             fits[name] = self._fit(emulator, (name,))
+        if self.names:
+            known = {name: fits[name].candidate for name in self.names}
+            fits[UNLISTED] = unlisted(self.observation, self.data, fits[NONE], known)
         for pair in pairs(self._score(fits)) if with_pairs else ():
             found = self._fit(emulator, pair)
             fits[found.candidate.label] = found
@@ -316,8 +322,7 @@ class _Look:
 
     def _score(self, fits: Mapping[str, Fitted]) -> Scored:
         evidence = {label: f.log_evidence for label, f in fits.items()}
-        members = {label: len(f.candidate.names) for label, f in fits.items()}
-        return score(evidence, members, len(self.names), self.temperature)
+        return score(evidence, len(self.names), self.temperature)
 
 
 def confirmed(emulator: Emulator, simulate: Simulate, fits: Mapping[str, Fitted], scored: Scored) -> Emulator:
@@ -356,7 +361,7 @@ def closures(
     none = held_out(best.candidate, data, within + across, best.parameters)
     complete = left_by_complete(best.candidate, data, within, best.parameters, rng)
     found = {}
-    for label in [label for label in scored.ranked() if label != NONE][:closed]:
+    for label in scored.causes()[:closed]:
         other = held_out(fits[label].candidate, data, within + across, fits[label].parameters)
         found[label] = closure(observation, data, none, other, complete, rng.spawn(1)[0])
     return found

@@ -67,6 +67,8 @@ class Effect(ABC):
     magnitude : Magnitude
     equivalents : what else, not in the library, does exactly the same
     remedy : what to measure to find out, or to do without it
+    coarseness : standard deviation of the value that particles of 1 mm radius leave open: nothing is placed in a
+        lattice better than by a particle
     belongs : to what: the material (as large in every test of it), the set-up (as large in every test made alike), or
         this one test
     """
@@ -76,6 +78,7 @@ class Effect(ABC):
     magnitude: ClassVar[Magnitude]
     equivalents: ClassVar[tuple[str, ...]] = ()
     remedy: ClassVar[str]
+    coarseness: ClassVar[float] = 0.0
     belongs: ClassVar[Belongs]
     kind: ClassVar[str]
 

@@ -46,12 +46,15 @@ class Signature:
         """Change (n,) for a value of one, of the straight line nearest to the two."""
         return np.asarray(self.values @ self.changes / (self.values @ self.values))
 
-    def curved(self, value: float) -> np.ndarray:
-        """The part (n,) of the change that does not grow in proportion to the value.
+    def off(self, value: float) -> np.ndarray:
+        """How far (n,) the change by another value may be off: as far, in proportion, as two are from the line.
 
         Two values cannot tell a curve from a crack that goes another way in one of the simulations.
         """
-        return self.at(value) - value * self.slope
+        one, two = self.changes / self.values[:, None]
+        curvature = (two - one) / (self.values[1] - self.values[0])
+        middle = np.sum(self.values**3) / np.sum(self.values**2)
+        return np.asarray(value * np.sqrt(np.mean((self.values - middle) ** 2)) * curvature)
 
     def corrected(self, value: float, error: np.ndarray) -> Signature:
         """With a change that grows in proportion to the value and is `error` (n,) at this one."""
@@ -259,10 +262,10 @@ class Emulator:
         )
 
     def _doubt(self, names: Sequence[str], amplitudes: np.ndarray) -> np.ndarray:
-        """What is curved in the physics effects among some; (j, 2sp + s)."""
+        """By what the changes by the physics effects among some are uncertain; (j, 2sp + s)."""
         _, physics = self._sorted(names, amplitudes)
         signatures = self._read[1]
-        rows = [signatures[name].curved(value) for name, value in physics.items()]
+        rows = [signatures[name].off(value) for name, value in physics.items()]
         return np.reshape(rows, (len(rows), 2 * self.sight.cmod.size * len(self.sight.points) + self.sight.cmod.size))
 
     def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtri
 
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.metric import Metric
+from pipeline.gap.metric import Metric, doubted
 
 STEP = 1e-3  # of the box, and of an amplitude's scale: central differences
 COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH standard deviations
@@ -264,7 +264,7 @@ def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, n
         return np.zeros((1, 0)), np.zeros(1)
     unit = _scales(candidate, data)
     prior = np.concatenate([np.zeros(q), [1 / m.scale**2 for m in candidate.components]]) * unit**2
-    scaled = slopes * unit
+    scaled = doubted(slopes, data.doubt(candidate, at[q:])) * unit
     covariance = (np.linalg.inv(scaled.T @ scaled + np.diag(prior)) * np.outer(unit, unit))[q:, q:]
     if k == 1:
         low, high = candidate.bounds[0]

@@ -11,6 +11,7 @@ from scipy.spatial.distance import squareform
 
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.fit import Data, jacobian
+from pipeline.gap.metric import doubted
 
 DETECTED = 3.0  # d′ from which an effect counts as detectable: one wrong in 700 either way, none of twenty by chance
 APART = 2.0  # d′ that must remain against a competitor for two effects to be told apart
@@ -50,40 +51,50 @@ class Card:
 
 @dataclass(frozen=True, eq=False)
 class _Signal:
-    """What is left of an effect after the refit of the parameters, along each of its directions and signs."""
+    """What an effect changes, white, and how uncertain that is, along each of its directions and signs."""
 
     candidate: Candidate
     data: Data
     at: np.ndarray
     none: np.ndarray
-    slopes: np.ndarray  # orthonormal (n, q)
+    slopes: np.ndarray  # (n, q), white, by the parameters
+
+    def change(self, amplitudes: np.ndarray) -> np.ndarray:
+        return self.data.metric.white(self.candidate.predict(self.at, amplitudes) - self.none)
+
+    def doubt(self, amplitudes: np.ndarray) -> np.ndarray | None:
+        return self.data.doubt(self.candidate, amplitudes)
+
+    def left(self, change: np.ndarray, doubt: np.ndarray | None) -> np.ndarray:
+        """What the parameters cannot make up of a change (n,) or (n, k), counted where data are so uncertain."""
+        base = np.linalg.qr(doubted(self.slopes, doubt))[0]
+        seen = doubted(change, doubt)
+        return np.asarray(seen - base @ (base.T @ seen))
 
     def of(self, amplitudes: np.ndarray) -> np.ndarray:
-        change = self.data.metric.white(self.candidate.predict(self.at, amplitudes) - self.none)
-        left = change - self.slopes @ (self.slopes.T @ change)
-        return doubted(left, self.data.doubt(self.candidate, amplitudes))
+        return self.left(self.change(amplitudes), self.doubt(amplitudes))
 
-    def weakest(self, value: float) -> np.ndarray:
-        """Of all directions and signs that a size allows, the change that is seen least."""
-        return min(self.all(value), key=np.linalg.norm)
+    def weakest(self, value: float) -> float:
+        """d′ of the direction and sign of a size that is seen least."""
+        return min(float(np.linalg.norm(self.of(a))) for a in self.all(value))
 
     def all(self, value: float) -> list[np.ndarray]:
-        """Changes for every direction and sign of a size."""
+        """Amplitudes for every direction and sign of a size."""
         size = self.candidate.magnitudes[0]
         if size.directions == 2:
             along = [self.of(value * np.eye(2)[i]) for i in (0, 1)]
             _, _, right = np.linalg.svd(np.column_stack(along), full_matrices=False)
-            return [self.of(value * row) for row in right]
-        return [self.of(np.array([sign * value])) for sign in (1, -1) if size.low <= sign * value <= size.high]
+            return [value * row for row in right]
+        return [np.array([sign * value]) for sign in (1, -1) if size.low <= sign * value <= size.high]
 
 
 def card(candidates: Mapping[str, Candidate], data: Data, parameters: np.ndarray, temperature: float = 1.0) -> Card:
     """What could be told apart at these parameters.
 
-    d′ = ‖(I − P) L⁻¹ Δy‖ with Δy the change of the data by the effect and P the projector onto what a change of
-    (f_max, δ_max) does (Macmillan and Creelman 2005, for the ideal observer of a known signal). Tempering divides by
-    √temperature. Against a competitor its best amplitude, within its bounds, is taken off too; the change is taken as
-    linear in that amplitude.
+    d′ = ‖(I − P) L⁻¹ Δy‖ with Δy the change of the data by the effect, L Lᵀ the covariance with what is uncertain in
+    that change itself, and P the projector onto what a change of (f_max, δ_max) does (Macmillan and Creelman 2005, for
+    the ideal observer of a known signal). Tempering divides by √temperature. Against a competitor its best amplitude,
+    within its bounds, is taken off too, in the same metric; the change is taken as linear in that amplitude.
 
     Parameters
     ----------
@@ -96,11 +107,10 @@ def card(candidates: Mapping[str, Candidate], data: Data, parameters: np.ndarray
     signals = [_signal(candidates[n], data, parameters) for n in names]
     root = np.sqrt(temperature)
     largest = np.array([s.candidate.magnitudes[0].high for s in signals])
-    d_prime = np.array([np.linalg.norm(s.weakest(m)) for s, m in zip(signals, largest, strict=True)]) / root
+    d_prime = np.array([s.weakest(m) for s, m in zip(signals, largest, strict=True)]) / root
     limit = np.array([_limit(s, m, root) for s, m in zip(signals, largest, strict=True)])
     at = np.where(np.isfinite(limit), np.minimum(OFTEN * np.where(np.isfinite(limit), limit, 0), largest), largest)
-    changes = [s.all(v) for s, v in zip(signals, at, strict=True)]
-    remaining = np.array([[_remaining(c, s) for s in signals] for c in changes]) / root
+    remaining = np.array([[_remaining(s, v, o) for o in signals] for s, v in zip(signals, at, strict=True)]) / root
     np.fill_diagonal(remaining, 0.0)
     return Card(names, limit, d_prime, at, remaining, classes(names, limit, remaining))
 
@@ -108,23 +118,15 @@ def card(candidates: Mapping[str, Candidate], data: Data, parameters: np.ndarray
 def _signal(candidate: Candidate, data: Data, parameters: np.ndarray) -> _Signal:
     none = np.zeros(len(candidate.bounds))
     at = np.append(parameters, none)
-    slopes = np.linalg.qr(jacobian(candidate, data, at, np.arange(len(data.box))))[0]
+    slopes = jacobian(candidate, data, at, np.arange(len(data.box)))
     return _Signal(candidate, data, parameters, candidate.predict(parameters, none), slopes)
-
-
-def doubted(change: np.ndarray, doubt: np.ndarray | None) -> np.ndarray:
-    """(I + B Bᵀ)^(−1/2) times a white change (n,): what is left of it where it is itself uncertain by B (n, k)."""
-    if doubt is None:
-        return change
-    shape, strength, _ = np.linalg.svd(doubt, full_matrices=False)
-    return np.asarray(change - shape @ ((1 - 1 / np.sqrt(1 + strength**2)) * (shape.T @ change)))
 
 
 def _limit(signal: _Signal, largest: float, root: float) -> float:
     """The smallest size with d′ = `DETECTED`, by bisection; inf where even the largest has less."""
 
     def seen(value: float) -> bool:
-        return bool(np.linalg.norm(signal.weakest(value)) >= DETECTED * root)
+        return signal.weakest(value) >= DETECTED * root
 
     if not seen(largest):
         return float("inf")
@@ -135,16 +137,21 @@ def _limit(signal: _Signal, largest: float, root: float) -> float:
     return high
 
 
-def _remaining(changes: list[np.ndarray], competitor: _Signal) -> float:
-    """The least that a competitor leaves of any of these changes."""
+def _remaining(signal: _Signal, value: float, competitor: _Signal) -> float:
+    """The least that a competitor leaves of an effect of this size, whatever its direction and sign."""
     size = competitor.candidate.magnitudes[0]
+    both = [size.high * row for row in np.eye(2)] if size.directions == 2 else competitor.all(size.high)
+    trials = [competitor.change(a) for a in both]
     found = []
-    for change in changes:
+    for amplitudes in signal.all(value):
+        doubt = signal.doubt(amplitudes)
+        change = signal.left(signal.change(amplitudes), doubt)
+        others = [signal.left(t, doubt) for t in trials]
         if size.directions == 2:
-            basis = np.column_stack([competitor.of(size.high * row) for row in np.eye(2)])
+            basis = np.column_stack(others)
             found.append(np.linalg.norm(change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]))
             continue
-        for trial in competitor.all(size.high):
+        for trial in others:
             power = float(trial @ trial)
             share = np.clip(trial @ change / power, 0.0, 1.0) if power > 0 else 0.0
             found.append(np.linalg.norm(change - share * trial))

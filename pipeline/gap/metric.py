@@ -50,6 +50,11 @@ class Metric:
             ) from None
         return shape.T, np.clip(size, 0.0, 1.0)
 
+    @cached_property
+    def log_volume(self) -> float:
+        """Logarithm of the determinant of Σ."""
+        return -2 * float(np.linalg.slogdet(self._root[0])[1])
+
     def white(self, values: np.ndarray) -> np.ndarray:
         """L⁻¹ times values (n,) or (n, k): independent, of standard deviation one."""
         return self._root[0] @ values
@@ -88,6 +93,14 @@ class Metric:
     def std(self) -> np.ndarray:
         """Standard deviation of every datum; (n,)."""
         return np.sqrt(np.diag(self.covariance))
+
+
+def doubted(white: np.ndarray, doubt: np.ndarray | None) -> np.ndarray:
+    """(I + B Bᵀ)^(−1/2) times white values (n,) or (n, k): what is left where data are uncertain by B (n, j)."""
+    if doubt is None or not doubt.size:
+        return white
+    shape, strength, _ = np.linalg.svd(doubt, full_matrices=False)
+    return np.asarray(white - (shape * (1 - 1 / np.sqrt(1 + strength**2))) @ (shape.T @ white))
 
 
 def _log_density(residual: np.ndarray, variance: np.ndarray, doubt: np.ndarray | None) -> float:

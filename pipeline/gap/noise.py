@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.gap.fit import Data, Fitted, climbed
 from pipeline.gap.metric import Metric
 from pipeline.gap.observation import Observation
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, UNLISTED
 
 
 def noise_bic(observation: Observation, data: Data, fits: Mapping[str, Fitted]) -> dict[str, float]:
@@ -23,13 +23,15 @@ def noise_bic(observation: Observation, data: Data, fits: Mapping[str, Fitted]) 
     ----------
     observation : Observation
     data : Data of its data; the metric is not used
-    fits : label → Fitted, where the refits start; "none" among them
+    fits : label → Fitted, where the refits start; "none" among them; an effect of unknown shape has no such fit
     """
     bare = replace(data, metric=Metric(np.diag(observation.noise[observation.mask])))
     plain = fits[NONE]
     alone, *_ = climbed(plain.candidate, bare, plain.parameters)
     found = {}
     for label, fitted in fits.items():
+        if label == UNLISTED:
+            continue
         without = np.append(alone, np.zeros(fitted.amplitudes.size))
         starts = [np.append(fitted.parameters, fitted.amplitudes), without]
         square = min(climbed(fitted.candidate, bare, start)[1] for start in starts)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 NONE = "none"
+UNLISTED = "outside the library"  # an effect that the library lacks
 P_NONE = 0.5  # before anything is seen
 
 
@@ -30,9 +31,13 @@ class Scored:
         """Labels, the most probable first."""
         return sorted(self.probability, key=lambda label: (-self.probability[label], label))
 
+    def causes(self) -> list[str]:
+        """Labels that name effects, the most probable first."""
+        return [label for label in self.ranked() if names_of(label)]
+
     def part(self, name: str) -> float:
         """Probability that an effect takes part, alone or with others."""
-        return float(sum(p for label, p in self.probability.items() if name in label.split(" + ")))
+        return float(sum(p for label, p in self.probability.items() if name in names_of(label)))
 
     def credible(self, share: float = 0.9) -> list[str]:
         """The fewest labels whose probabilities sum to the share."""
@@ -45,6 +50,16 @@ class Scored:
         return found
 
 
+def names_of(label: str) -> tuple[str, ...]:
+    """The effects that a label names; none where it is `NONE` or `UNLISTED`."""
+    return () if label in (NONE, UNLISTED) else tuple(label.split(" + "))
+
+
+def order_of(label: str) -> int:
+    """How many effects a label stands for: one that the library lacks is as probable beforehand as one that it has."""
+    return 1 if label == UNLISTED else len(names_of(label))
+
+
 def inclusion(effects: int) -> float:
     """Prior odds of one effect where each of so many is there or not by itself, and none with `P_NONE`.
 
@@ -53,29 +68,24 @@ def inclusion(effects: int) -> float:
     return float(P_NONE ** (-1 / max(effects, 1)) - 1)
 
 
-def score(
-    log_evidence: Mapping[str, float], members: Mapping[str, int], effects: int, temperature: float = 1.0
-) -> Scored:
+def score(log_evidence: Mapping[str, float], effects: int, temperature: float = 1.0) -> Scored:
     """Probabilities of candidates.
 
     Parameters
     ----------
     log_evidence : label → from `fit`; must hold "none"
-    members : label → how many effects it has
     effects : int; in the library, tested
     temperature : float, at least 1; log Bayes factors are divided by it: what simulators leave is less independent
         than Σ says (calibrated on tests of another engine)
     """
     log_bayes = {label: log_evidence[label] - log_evidence[NONE] for label in log_evidence}
-    return from_bayes(log_bayes, members, effects, temperature)
+    return from_bayes(log_bayes, effects, temperature)
 
 
-def from_bayes(
-    log_bayes: Mapping[str, float], members: Mapping[str, int], effects: int, temperature: float = 1.0
-) -> Scored:
+def from_bayes(log_bayes: Mapping[str, float], effects: int, temperature: float = 1.0) -> Scored:
     """Probabilities from log Bayes factors; arguments as of `score`."""
     odds = np.log(inclusion(effects))
-    weight = np.array([log_bayes[label] / temperature + members[label] * odds for label in log_bayes])
+    weight = np.array([log_bayes[label] / temperature + order_of(label) * odds for label in log_bayes])
     share = np.exp(weight - weight.max())
     share /= share.sum()
     return Scored(dict(log_bayes), dict(zip(log_bayes, share.tolist(), strict=True)), temperature)
@@ -92,5 +102,5 @@ def pooled(replicates: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def pairs(singles: Scored, best: int = 3) -> list[tuple[str, str]]:
     """The pairs of the most probable single effects."""
-    top = [label for label in singles.ranked() if label != NONE][:best]
+    top = singles.causes()[:best]
     return sorted((min(a, b), max(a, b)) for i, a in enumerate(top) for b in top[i + 1 :])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-WORTH = 2.0  # of log likelihood, for one more effect (Akaike 1974 asks for one)
+WORTH = 4.0  # of log likelihood, for one more effect: log √24 for specimens (Schwarz 1978) and log 13 for the choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Seeming:
     effects: Mapping[str, np.ndarray]
 
 
-def apparent(specimens: Sequence[Seeming]) -> dict[str, float]:
+def apparent(specimens: Sequence[Seeming], least: Mapping[str, float] | None = None) -> dict[str, float]:
     """Standard deviations of effects that make what specimens leave most likely; effects that do not help are left out.
 
     One after the other the effect that raises the likelihood most, by `WORTH` at least, all standard deviations anew
@@ -34,27 +34,36 @@ def apparent(specimens: Sequence[Seeming]) -> dict[str, float]:
     Parameters
     ----------
     specimens : Seeming of each; effects that could not be simulated may lack
+    least : effect → standard deviation that it has in any case
     """
+    least = least or {}
     names = sorted({name for one in specimens for name in one.effects})
     chosen: dict[str, float] = {}
-    best = 0.0
+    best = _likelihood(specimens, least)
     while rest := [name for name in names if name not in chosen]:
-        found, likelihood = max((_likeliest(specimens, [*chosen, name]) for name in rest), key=lambda one: one[1])
+        found, likelihood = max(
+            (_likeliest(specimens, [*chosen, name], least) for name in rest), key=lambda one: one[1]
+        )
         if likelihood < best + WORTH:
             break
         chosen, best = found, likelihood
-    return chosen
+    return {**least, **chosen}
 
 
-def _likeliest(specimens: Sequence[Seeming], names: list[str]) -> tuple[dict[str, float], float]:
+def _likeliest(
+    specimens: Sequence[Seeming], names: list[str], least: Mapping[str, float]
+) -> tuple[dict[str, float], float]:
     """The likeliest standard deviations of some effects, and the logarithm of their likelihood against none."""
     squares = {n: [one.effects[n] @ one.effects[n] for one in specimens if n in one.effects] for n in names}
     unit = np.array([1 / np.sqrt(np.mean(squares[n]) + 1e-300) for n in names])
 
     def scatter(log: np.ndarray) -> dict[str, float]:
-        return dict(zip(names, (unit * np.exp(np.clip(log, -20, 20))).tolist(), strict=True))
+        found = zip(names, (unit * np.exp(np.clip(log, -20, 20))).tolist(), strict=True)
+        return {name: float(np.hypot(value, least.get(name, 0.0))) for name, value in found}
 
-    found = minimize(lambda log: -_likelihood(specimens, scatter(log)), np.ones(len(names)), method="Nelder-Mead")
+    found = minimize(
+        lambda log: -_likelihood(specimens, {**least, **scatter(log)}), np.ones(len(names)), method="Nelder-Mead"
+    )
     return scatter(found.x), -float(found.fun)
 
 

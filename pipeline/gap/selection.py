@@ -117,7 +117,12 @@ class Selected:
     apparent: dict[str, float]
 
 
-def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Sequence[float] = PLACED) -> Selected:
+def selected(
+    rests: Sequence[Rest],
+    least: Mapping[str, float] | None = None,
+    shares: Sequence[float] = SHARES,
+    placed: Sequence[float] = PLACED,
+) -> Selected:
     """The discrepancy of all, with the share of their own waves and the scales that are likeliest for those left out.
 
     Modes in which specimens left out are still farther off than they should be are widened by just that.
@@ -125,6 +130,7 @@ def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Se
     Parameters
     ----------
     rests : Rest of every specimen, at least four
+    least : effect → standard deviation that specimens seem to have in any case
     shares, placed : that are tried
     """
     tried = [(share, place, left_out(rests, share, place)) for share in shares for place in placed]
@@ -141,7 +147,7 @@ def selected(rests: Sequence[Rest], shares: Sequence[float] = SHARES, placed: Se
         freedom_of([(g.ratio[m], g.freedom[m]) for g in gates for m in g.ratio]),
         checked(left, scale),
         scale.log_density,
-        apparent([seeming(one, scale) for one in left]),
+        apparent([seeming(one, scale) for one in left], least),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.gap.fit import Fitted, fit
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import Card, classes
-from pipeline.gap.score import NONE, Scored, from_bayes, pairs, pooled
+from pipeline.gap.score import NONE, UNLISTED, Scored, from_bayes, names_of, pairs, pooled
 from pipeline.gap.transfer import Test, Transfer, transfers
 from pipeline.gap.verdict import Verdict, verdict
 
@@ -53,13 +53,13 @@ def together(tests: Sequence[Test], rng: np.random.Generator) -> Together:
     rng : numpy Generator; of bootstrap and floor
     """
     names = sorted(set.intersection(*(set(t.diagnosis.card.names) for t in tests)))
-    singles = scored_together(tests, [NONE, *names], len(names))
+    singles = scored_together(tests, [NONE, UNLISTED, *names], len(names))
     wanted = [*pairs(singles), *_pairs_of_all(tests)]
     tests = tuple(_with_pairs(t, wanted) for t in tests)
-    labels = [NONE, *names, *dict.fromkeys(" + ".join(p) for p in wanted)]
+    labels = [NONE, UNLISTED, *names, *dict.fromkeys(" + ".join(p) for p in wanted)]
     scored = scored_together(tests, labels, len(names))
     card, gate = pooled_card([t.diagnosis.card for t in tests], names), pooled_gate([t.diagnosis.gate for t in tests])
-    best = [label for label in scored.ranked() if label != NONE][:TOLD]
+    best = scored.causes()[:TOLD]
     return Together(
         tests=tests,
         scored=scored,
@@ -82,14 +82,13 @@ def scored_together(tests: Sequence[Test], labels: Sequence[str], effects: int) 
     ahead = np.median(rows[:, None] - rows, axis=2).min(axis=1)
     best = rows[int(np.argmax(ahead))]
     found = pooled([dict(zip(labels, row, strict=True)) for row in (rows - best).T])
-    members = {label: 0 if label == NONE else label.count(" + ") + 1 for label in labels}
     temperature = max(t.diagnosis.scored.temperature for t in tests)
-    return from_bayes({label: found[label] - found[NONE] for label in labels}, members, effects, temperature)
+    return from_bayes({label: found[label] - found[NONE] for label in labels}, effects, temperature)
 
 
 def _pairs_of_all(tests: Sequence[Test]) -> list[tuple[str, ...]]:
     """Pairs that every test came upon by itself."""
-    own = [{tuple(label.split(" + ")) for label in t.diagnosis.fits if " + " in label} for t in tests]
+    own = [{names_of(label) for label in t.diagnosis.fits if len(names_of(label)) > 1} for t in tests]
     return sorted(set.intersection(*own))
 
 

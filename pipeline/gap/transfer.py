@@ -13,7 +13,7 @@ from pipeline.gap.closure import Closure, closure, folds, held_out, left_by_comp
 from pipeline.gap.diagnosis import Diagnosis, Run, Simulate
 from pipeline.gap.effects import effect
 from pipeline.gap.emulator import Emulator
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, names_of
 
 REPLICATE, OTHER = "replicate", "other condition"
 
@@ -105,7 +105,7 @@ def _to(
         judged = closure(
             d.observation, d.data, left, held_out(candidate, fixed, within, start), complete, rng.spawn(1)[0]
         )
-        names = label.split(" + ")
+        names = names_of(label)
         carried = tuple(n for n in names if _carries(n, kind))
         refitted = tuple(n for n in names if n not in carried)
         found.append(Transfer(label, target.name, tuple(s.name for s in sources), kind, carried, refitted, judged))

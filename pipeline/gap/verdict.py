@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pipeline.gap.fit import Fitted
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import Card
-from pipeline.gap.score import NONE, Scored
+from pipeline.gap.score import NONE, UNLISTED, Scored, names_of
 
 SURE = 0.8  # probability from which a cause or a class is named
-HALF = 0.5  # probability of none from which no cause is looked for
+HALF = 0.5  # probability of none, or of what the library lacks, from which no cause is looked for
 
-NONE_NEEDED, CAUSE, CLASS, ONE_OF, OUTSIDE = "none needed", "cause", "class", "one of", "outside the library"
+NONE_NEEDED, CAUSE, CLASS, ONE_OF, OUTSIDE = "none needed", "cause", "class", "one of", UNLISTED
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,15 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
         return Verdict(
             NONE_NEEDED, (), f"{told}, but these data show no effect of any plausible size" if blind else told
         )
-    top = next(label for label in scored.ranked() if label != NONE)
-    names = tuple(top.split(" + "))
+    strange = scored.probability.get(UNLISTED, 0.0)
+    if strange >= HALF:
+        return Verdict(
+            OUTSIDE,
+            (),
+            f"an effect that the library lacks explains these data better than any that it has: {strange:.2f}",
+        )
+    top = scored.causes()[0]
+    names = names_of(top)
     mates = tuple(dict.fromkeys(m for n in names for m in card.class_of(n)))
     alone = len(mates) == len(names)
     if scored.probability[top] >= SURE and alone:
@@ -57,9 +64,10 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
     together = sum(p for label, p in scored.probability.items() if label in mates)
     if len(names) == 1 and not alone and together >= SURE:
         return Verdict(CLASS, mates, f"one of these has probability {together:.2f}; these data do not tell them apart")
-    credible = [label for label in scored.credible() if label != NONE]
-    named = tuple(dict.fromkeys(n for label in credible for n in label.split(" + ")))
+    named = tuple(dict.fromkeys(n for label in scored.credible() for n in names_of(label)))
     told = f"no single one reaches {SURE}; these hold 90 % of the probability"
+    if UNLISTED in scored.credible():
+        told += f", with {strange:.2f} for an effect that the library lacks"
     sure = [n for n in named if scored.part(n) >= SURE]
     told += "".join(f"; {n} takes part, alone or with others, with {scored.part(n):.2f}" for n in sure)
     return Verdict(ONE_OF, named, told)

@@ -19,7 +19,7 @@ ROWS = 240  # of a curve
 
 def shown(diagnosis: Diagnosis) -> list[Fitted]:
     """The model as it is, then the most probable explanations."""
-    best = [label for label in diagnosis.scored.ranked() if label != NONE][:SHOWN]
+    best = diagnosis.scored.causes()[:SHOWN]
     return [diagnosis.fits[label] for label in (NONE, *best)]
 
 

@@ -15,7 +15,7 @@ from pipeline.gap.effects import effect, library
 from pipeline.gap.fit import Fitted
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import DETECTED, Card
-from pipeline.gap.score import NONE, Scored
+from pipeline.gap.score import NONE, Scored, names_of
 from pipeline.gap.verdict import CAUSE, Verdict
 from pipeline.gap.weighing import scatter
 from pipeline.store.bundle import Bundle
@@ -133,15 +133,14 @@ def scatter_result(d: Diagnosis) -> dict[str, dict[str, float | None]]:
 
 def excluded_not(scored: Scored, card: Card, verdict: Verdict, untested: Mapping[str, str]) -> list[str]:
     """Effects these data do not rule out: untested, too small to be seen, or still in the 90 % set."""
-    likely = {n for label in scored.credible() if label != NONE for n in label.split(" + ")}
+    likely = {n for label in scored.credible() for n in names_of(label)}
     found = {*untested, *card.hidden, *likely, *(m for n in verdict.named for m in card.class_of(n))}
     return sorted(found - set(verdict.named if verdict.kind == CAUSE else ()))
 
 
 def remedies(scored: Scored, card: Card, verdict: Verdict, untested: Mapping[str, str]) -> list[str]:
     """What to measure next, for what is named and its rivals first, then for what cannot be seen."""
-    labels = [label for label in scored.credible() if label != NONE]
-    first = [n for label in labels for n in label.split(" + ")] + list(verdict.named)
+    first = [n for label in scored.credible() for n in names_of(label)] + list(verdict.named)
     hidden = excluded_not(scored, card, verdict, untested)
     return [f"{n}: {effect(n).remedy}" for n in dict.fromkeys([*first, *hidden])]
 

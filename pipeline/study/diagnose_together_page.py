@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, names_of
 from pipeline.gap.together import Together
 from pipeline.gap.transfer import Test
 from pipeline.report.diagnosis import closures, forest, loads, ranking
@@ -64,7 +64,7 @@ def _each(folder: Path, joint: Together, result: Mapping[str, Any]) -> Section:
     each = {t.name: t.diagnosis.scored.probability for t in joint.tests}
     told = "Probability of each explanation: pooled (bars), by every test alone (circles)."
     figures = [picture(folder, "ranking", lambda a: ranking(a, joint.scored.probability, each), told)]
-    top = next(label for label in joint.scored.ranked() if label != NONE).split(" + ")[0]
+    top = names_of(joint.scored.causes()[0])[0]
     rows, unit = _sizes(joint, top), result["estimate"][top]["unit"]
     label = f"{top}{'' if unit == '1' else f' ({unit})'}"
     told = "Its size in every test, if it is the only one, with 95 % intervals."

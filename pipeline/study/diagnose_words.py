@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.gap.effects import effect, library
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, UNLISTED, names_of
 from pipeline.report.diagnosis import short
 from pipeline.report.page import Number, Section
 
-CALLED = {NONE: "model as it is"}
+CALLED = {NONE: "model as it is", UNLISTED: "an effect that the library lacks"}
 MOST = 2.0  # share of a gap that is written in full
 CELLS = 4  # of the table of where, in words
 SPEAKS = 0.5  # log Bayes factor, either way, from which data say something of an effect
@@ -21,7 +21,7 @@ SPEAKS = 0.5  # log Bayes factor, either way, from which data say something of a
 def verdict_section(result: Mapping[str, Any], remarks: Any) -> Section:
     """What is said, how large it is, what it does to the parameters, what to do about it."""
     told = [f"{result['verdict'].capitalize()}: {_meant(result)}.", f"{_sentence(result['reason'])}."]
-    first = next((label for label in result["closure"] if set(label.split(" + ")) <= set(result["named"])), None)
+    first = next((label for label in result["closure"] if set(names_of(label)) <= set(result["named"])), None)
     if first is not None:
         held = "tests that it was not fitted to" if "transfer" in result else "data not used for it"
         told.append(f"{_sentence(closed(first, result['closure'][first], held))}.")
@@ -121,7 +121,7 @@ def likely(result: Mapping[str, Any]) -> list[Number]:
     """The explanations that hold 90 % of the probability, with their sizes."""
     rows, said = [], speaking(result)
     for label in said:
-        names = label.split(" + ") if label != NONE else []
+        names = names_of(label)
         sizes = [effect(name).says for name in names]
         if len(names) == 1:
             found = result["estimate"][names[0]]
@@ -138,7 +138,7 @@ def likely(result: Mapping[str, Any]) -> list[Number]:
 def alike(result: Mapping[str, Any]) -> list[str]:
     """What these data do not tell apart, or nobody could."""
     classes = [" = ".join(c) + ": not told apart by these data" for c in result["equivalence_classes"]]
-    likely_ = {n for label in result["set_90"] for n in label.split(" + ")}
+    likely_ = {n for label in result["set_90"] for n in names_of(label)}
     same = [
         f"{n} does exactly what {' or '.join(e)} would do" for n, e in result["equivalents"].items() if n in likely_
     ]
@@ -163,7 +163,7 @@ def closure_row(label: str, c: Mapping[str, Any]) -> Number:
 
 def next_section(result: Mapping[str, Any]) -> Section:
     """What to measure: first what tells the likely explanations apart, then what cannot be seen."""
-    likely_ = {n for label in speaking(result) for n in label.split(" + ")} | set(result["named"])
+    likely_ = {n for label in speaking(result) for n in names_of(label)} | set(result["named"])
     first = [s for s in result["separate_by"] if s.split(":")[0] in likely_]
     rest = [s for s in result["separate_by"] if s not in first]
     told = "" if not first else "To confirm or to tell apart: " + "; ".join(first) + "."

@@ -12,7 +12,7 @@ from pipeline.core.errors import InputError, PipelineError
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.effects import effect, library
 from pipeline.gap.library import Entry
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, names_of
 from pipeline.gap.verdict import CAUSE, CLASS, NONE_NEEDED, OUTSIDE, SURE
 from pipeline.study.gap_calibration import answer, entry_of, sized
 from pipeline.study.gap_trials import Bench, Trial
@@ -135,4 +135,4 @@ def _sure(trial: Trial, temperature: float) -> bool:
     """Whether a single cause is stated at P ≥ 0.8, whatever the gate says."""
     scored = answer(trial).scored(temperature)
     first = scored.ranked()[0]
-    return trial.verdict != OUTSIDE and first != NONE and scored.probability[first] >= SURE
+    return trial.verdict != OUTSIDE and bool(names_of(first)) and scored.probability[first] >= SURE

@@ -156,7 +156,7 @@ def trial_of(
     d: Diagnosis, seed: int, effects: dict[str, float], without: tuple[str, ...], truth: tuple[float, float]
 ) -> Trial:
     """What is kept of a diagnosis."""
-    [first, *_] = [label for label in d.scored.ranked() if label != NONE]
+    first = d.scored.causes()[0]
     closure = d.closures.get(first)
     singles = [n for n in d.card.names if n in d.fits]
     estimates = {n: estimate(d, n) for n in singles}

@@ -38,6 +38,11 @@ def exact_log_bayes(target: np.ndarray, sigma: np.ndarray, base: np.ndarray, col
     return _restricted(target, sigma + scale**2 * np.outer(column, column), base) - _restricted(target, sigma, base)
 
 
+def factor_log_bayes(target: np.ndarray, sigma: np.ndarray, base: np.ndarray, more: np.ndarray) -> float:
+    """Of a further covariance, against none; the same way."""
+    return _restricted(target, sigma + more, base) - _restricted(target, sigma, base)
+
+
 def _restricted(y: np.ndarray, cov: np.ndarray, base: np.ndarray) -> float:
     inverse = np.linalg.inv(cov)
     normal = base.T @ inverse @ base

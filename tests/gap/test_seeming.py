@@ -32,6 +32,12 @@ def test_two_that_differ_are_both_found():
     assert len(found) == 2
 
 
+def test_what_is_known_beforehand_is_kept_and_explains_its_imitators():
+    some = specimens(200, {"a": 0.5}, np.random.default_rng(3))
+    assert apparent(some, {"a": 0.5}) == {"a": 0.5}
+    assert apparent(some, {"a": 0.1})["a"] == pytest.approx(0.5, rel=0.15)  # two hundred values: 5 %, thrice that
+
+
 def test_nothing_is_seen_in_noise():
     for seed in range(5):
         assert apparent(specimens(20, {}, np.random.default_rng(seed))) == {}

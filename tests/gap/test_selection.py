@@ -115,7 +115,7 @@ def test_probabilities_are_what_happens_when_scales_differ():
             given = Data(target, metric, BOX)
             evidence = {NONE: fit(none(base), given).log_evidence}
             evidence |= {f"{i}": fit(candidate(base, f"{i}", columns[:, i]), given).log_evidence for i in range(4)}
-            found = score(evidence, {label: int(label != NONE) for label in evidence}, 4)
+            found = score(evidence, 4)
             top = found.ranked()[0]
             stated[k].append(found.probability[top])
             right[k].append(top == (NONE if true < 0 else f"{true}"))

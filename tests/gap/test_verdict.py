@@ -13,7 +13,7 @@ from pipeline.gap.fit import Data, fit
 from pipeline.gap.gate import Gate
 from pipeline.gap.identifiability import DETECTED, Card, card
 from pipeline.gap.metric import Metric
-from pipeline.gap.score import NONE, from_bayes, inclusion, pooled, score
+from pipeline.gap.score import NONE, UNLISTED, from_bayes, inclusion, pooled, score
 from pipeline.gap.verdict import CAUSE, CLASS, NONE_NEEDED, ONE_OF, OUTSIDE, verdict
 from tests.gap.linear import BOX, candidate, none
 
@@ -36,21 +36,21 @@ def judged(target: np.ndarray, base: np.ndarray, columns: np.ndarray):
     evidence = {NONE: fit(none(base), data).log_evidence}
     for name, column in zip(names(columns.shape[1]), columns.T, strict=True):
         evidence[name] = fit(candidate(base, name, column, SIZE), data).log_evidence
-    return score(evidence, {n: int(n != NONE) for n in evidence}, columns.shape[1])
+    return score(evidence, columns.shape[1])
 
 
 def test_none_has_half_the_prior_and_a_pair_the_product_of_odds():
     for n in (1, 5, 20):
         assert (1 + inclusion(n)) ** -n == pytest.approx(0.5)
     odds = inclusion(2)
-    flat = from_bayes({NONE: 0.0, "a": 0.0, "b": 0.0, "a + b": 0.0}, {NONE: 0, "a": 1, "b": 1, "a + b": 2}, 2)
+    flat = from_bayes({NONE: 0.0, "a": 0.0, "b": 0.0, "a + b": 0.0}, 2)
     assert flat.probability[NONE] == pytest.approx(0.5)
     assert flat.probability["a + b"] == pytest.approx(odds**2 * 0.5)
 
 
 def test_temper_pulls_probabilities_towards_the_prior():
-    cold = from_bayes({NONE: 0.0, "a": 5.0}, {NONE: 0, "a": 1}, 20)
-    warm = from_bayes({NONE: 0.0, "a": 5.0}, {NONE: 0, "a": 1}, 20, temperature=5.0)
+    cold = from_bayes({NONE: 0.0, "a": 5.0}, 20)
+    warm = from_bayes({NONE: 0.0, "a": 5.0}, 20, temperature=5.0)
     assert warm.probability["a"] < cold.probability["a"]
     assert warm.log_bayes == cold.log_bayes
 
@@ -161,12 +161,22 @@ def cards(classes=()) -> Card:
 )
 def test_verdicts(bayes, classes, gate, kind, named):
     log_bayes = {NONE: 0.0, **dict(zip(names(3), bayes, strict=True))}
-    found = verdict(from_bayes(log_bayes, {n: int(n != NONE) for n in log_bayes}, 3), cards(classes), gate)
+    found = verdict(from_bayes(log_bayes, 3), cards(classes), gate)
     assert (found.kind, set(found.named)) == (kind, set(named))
 
 
+def test_what_the_library_lacks_is_weighed_like_an_effect_and_is_a_verdict():
+    for strange, kind in ((0.5, NONE_NEEDED), (30.0, OUTSIDE), (20.5, ONE_OF)):
+        scored = from_bayes({NONE: 0.0, UNLISTED: strange, "effect 0": 0.0 if strange < 20 else 21.0}, 3)
+        assert scored.probability[UNLISTED] / scored.probability[NONE] == pytest.approx(np.exp(strange) * inclusion(3))
+        found = verdict(scored, cards(), OPEN)
+        assert found.kind == kind, strange
+    assert found.named == ("effect 0",)
+    assert "an effect that the library lacks" in found.reason
+
+
 def test_data_that_show_nothing_are_not_praised():
-    flat = from_bayes({NONE: 0.0, **dict.fromkeys(names(3), 0.0)}, {NONE: 0, **dict.fromkeys(names(3), 1)}, 3)
+    flat = from_bayes({NONE: 0.0, **dict.fromkeys(names(3), 0.0)}, 3)
     n = len(names(3))
     blind = Card(tuple(names(3)), np.full(n, np.inf), np.full(n, 0.5), np.ones(n), np.zeros((n, n)), ())
     assert "show no effect" in verdict(flat, blind, OPEN).reason
@@ -175,7 +185,7 @@ def test_data_that_show_nothing_are_not_praised():
 
 def test_one_that_takes_part_in_all_explanations_is_said_to():
     log_bayes = {NONE: 0.0, "effect 0": 9.0, "effect 0 + effect 1": 10.5}
-    scored = from_bayes(log_bayes, {NONE: 0, "effect 0": 1, "effect 0 + effect 1": 2}, 3)
+    scored = from_bayes(log_bayes, 3)
     assert max(scored.probability.values()) < 0.8 < scored.part("effect 0")
     found = verdict(scored, cards(), OPEN)
     assert found.kind == ONE_OF

@@ -17,6 +17,7 @@ class NotchLength(PhysicsEffect):
     says = "the notch is longer than nominal"
     magnitude = Magnitude(-4.0, 4.0, 2.0, "mm")
     remedy = "measure the notch on the broken halves"
+    coarseness = 0.577  # its end lies anywhere within a radius: 1/√3
     belongs = "test"
 
     def change(self, value: float, plan: Plan) -> Plan:

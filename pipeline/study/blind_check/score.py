@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED
-from pipeline.gap.score import NONE
+from pipeline.gap.score import NONE, UNLISTED
 
 SURE, VISIBLE, OUTSIDE = 0.8, 5.0, "outside the library"
 Z = 1.959964  # of 95 %
@@ -27,8 +27,8 @@ class Scored:
     Parameters
     ----------
     name, specimen, kind : str
-    truth : label; effects joined by " + ", "none", or "outside"
-    top : the most probable label, "outside" where the gate refused, "failed" where there is no result
+    truth : label; effects joined by " + ", "none", or "outside the library"
+    top : the most probable label, "outside the library" where that is the verdict, "failed" where there is no result
     probability : float; of the top label
     result : the diagnosis
     row : of the truth table
@@ -120,7 +120,7 @@ def scores_together(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> di
 
 
 def _one(name: str, row: Mapping[str, Any], result: Mapping[str, Any] | None) -> Scored:
-    known = "outside" if row["kind"] == "outside" else label_of(list(row["effects"]))
+    known = UNLISTED if row["kind"] == "outside" else label_of(list(row["effects"]))
     common = {"name": name, "specimen": row["specimen"], "kind": row["kind"], "truth": known, "row": row}
     if result is None:
         return Scored(top="failed", probability=0.0, result={}, **common)
@@ -128,7 +128,7 @@ def _one(name: str, row: Mapping[str, Any], result: Mapping[str, Any] | None) ->
     top = max(sorted(chances), key=lambda n: chances[n], default="failed")
     p = float(chances.get(top, 0.0))
     if result.get("verdict") == OUTSIDE:
-        top = "outside"
+        top = UNLISTED
     return Scored(top=top, probability=p, result=result, **common)
 
 
@@ -291,8 +291,8 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
         "set_size": {"value": _mean(sizes), "interval_95": _bootstrap(sizes), "cases": len(sizes)},
         "ece": {"value": ece, "interval_95": _ece_interval(inside), "cases": len(inside)},
         "reliability": bins,
-        "outside_recall": share(outside, lambda c: c.top == "outside"),
-        "outside_recall_at_5_limits": share(clear_outside, lambda c: c.top == "outside"),
+        "outside_recall": share(outside, lambda c: c.top == UNLISTED),
+        "outside_recall_at_5_limits": share(clear_outside, lambda c: c.top == UNLISTED),
         "confident_wrong_outside": share(outside, named_surely),
         "pairs_top1": share(pairs, lambda c: c.right),
         "pairs_one_named": share(pairs, lambda c: bool(set(c.top.split(" + ")) & set(c.truth.split(" + ")))),
