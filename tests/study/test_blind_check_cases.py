@@ -38,6 +38,7 @@ def test_the_cases_of_a_full_check():
         assert sum(c.kind == "outside" and name in c.effects and name in c.without for c in found) == 1
     assert all(not set(c.effects) & set(c.without) for c in found if c.kind != "outside")
     assert sum(c.kind == "none" and bool(c.without) for c in found) > 0  # a short library betrays nothing
+    assert {len(c.without) for c in found} == {0, 3}  # one more name where something is hidden would betray it
     free = [c for c in found if c.kind == "none"]
     assert len(free) == 24
     assert len({(c.specimen, c.noise, bool(c.without)) for c in free}) == 24

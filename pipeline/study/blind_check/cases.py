@@ -16,7 +16,7 @@ REPLICATES = 4  # specimens of a set that is diagnosed together
 STRANGERS = {"aggregate_modulus": -0.5, "gauge_length": 0.5}  # no library has them; relative change
 HIDDEN = 5.0  # detection limits of an effect that the library lacks
 SHORTENED = 0.2  # of the tests with an effect are judged by a library that lacks others
-DECOYS = 2  # effects that are left out although they are not there, wherever something is left out
+LACKING = 3  # effects that are left out wherever something is, the hidden one among them or not
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,8 @@ def _row(names: tuple[tuple[str, float], ...], limits: Mapping[str, float], sign
 def _left_out(row: dict[str, Any], hidden: bool, rng: np.random.Generator) -> dict[str, Any]:
     """The row with a library that lacks some effects: its own, or only others."""
     others = [n for n in library() if n not in row["effects"]]
-    names = [*rng.choice(others, DECOYS, replace=False).tolist(), *(row["effects"] if hidden else ())]
+    own = list(row["effects"]) if hidden else []
+    names = [*rng.choice(others, LACKING - len(own), replace=False).tolist(), *own]
     return row | {"without": tuple(sorted(names)), "kind": "outside" if hidden else row["kind"]}
 
 

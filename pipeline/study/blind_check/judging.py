@@ -22,7 +22,7 @@ from pipeline.study.blind_check.looks import LOOKS, STRIPS, Look, write_look
 from pipeline.study.blind_check.seal import read_json
 from pipeline.study.diagnose import diagnose as diagnose_tests
 from pipeline.study.diagnose_case import Case, prepared
-from pipeline.study.diagnose_sight import abscissae_about, beside, seen
+from pipeline.study.diagnose_sight import abscissae_about, seen
 from pipeline.study.dic import FOLDER as DIC_FOLDER
 from pipeline.study.dic import measured_fields, with_measured_fields
 from pipeline.study.effects import Band
@@ -76,16 +76,18 @@ def diagnose(
 
 
 def prepared_alike(bundle: Bundle, folder: Path, engine: str, settings: RunSettings, progress: Progress) -> Case:
-    """The test prepared, with the strip and the CMOD values that it shares with others of its specimen."""
+    """The test prepared, with the strip and the CMOD values that it shares with others of its specimen.
+
+    Which points are too near the crack, and on which flank the others lie, its own path says.
+    """
     bundle = with_fields(bundle, settings, progress)
     case = prepared(bundle, folder, engine, settings, progress, Here())
     shared = bundle.folder.parents[1] / STRIPS
     row = read_json(shared).get(bundle.folder.name) if shared.exists() else None
     if row is None:
         return case
-    look_, band, kept = case.look, case.band, abscissae_about(row["peak_m"], row["last_m"])
+    band, kept = case.band, abscissae_about(row["peak_m"], row["last_m"])
     if row["path_m"] is not None:
         band = Band(np.array(row["path_m"]), band.half)
-        look_ = replace(look_, path=band.path, observation=beside(seen(bundle).observation, band.path))
     simulator = replace(case.simulator, band=band, abscissae=kept)
-    return replace(case, look=replace(look_, abscissae=kept), band=band, simulator=simulator)
+    return replace(case, look=replace(case.look, abscissae=kept), band=band, simulator=simulator)
