@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.study.batch import Batch
 from pipeline.study.blind_check.limits import FIRST_SEED, make_limits
 from pipeline.terminal import Display
 
@@ -20,9 +21,7 @@ def main() -> None:
     asked = parser.parse_args()
     seeds = range(asked.first_seed, asked.first_seed + asked.specimens)
     with Display() as progress:
-        told = make_limits(
-            asked.out, asked.file, seeds=seeds, geometry=asked.geometry, radius_mm=asked.radius_mm, progress=progress
-        )
+        told = make_limits(Batch(asked.out, asked.geometry, asked.radius_mm, progress), asked.file, seeds)
     print(told)
 
 

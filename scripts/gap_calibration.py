@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.study.batch import Batch
 from pipeline.study.gap_calibration import calibrate
 from pipeline.terminal import Display
 
@@ -21,15 +22,8 @@ def main() -> None:
     asked = parser.parse_args()
     seeds = range(asked.first_seed, asked.first_seed + asked.specimens)
     with Display() as progress:
-        told = calibrate(
-            asked.out,
-            asked.file,
-            seeds=seeds,
-            effects=asked.effects,
-            geometry=asked.geometry,
-            radius_mm=asked.radius_mm,
-            progress=progress,
-        )
+        batch = Batch(asked.out, asked.geometry, asked.radius_mm, progress)
+        told = calibrate(batch, asked.file, seeds, asked.effects)
     print(told)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.study.batch import Batch
 from pipeline.study.gap_confusion import TIMES, confusion
 from pipeline.terminal import Display
 
@@ -23,14 +24,12 @@ def main() -> None:
     middle = asked.first_seed + asked.specimens
     with Display() as progress:
         told = confusion(
-            asked.out,
+            Batch(asked.out, radius_mm=asked.radius_mm, progress=progress),
             asked.file,
-            seeds=range(asked.first_seed, middle),
+            range(asked.first_seed, middle),
             free=range(middle, middle + asked.free),
             names=asked.effects,
             times=asked.times,
-            radius_mm=asked.radius_mm,
-            progress=progress,
         )
     print(told)
 

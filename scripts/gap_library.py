@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.study.batch import Batch
 from pipeline.study.gap_library import make_library
 from pipeline.terminal import Display
 
@@ -21,15 +22,8 @@ def main() -> None:
     asked = parser.parse_args()
     seeds = range(asked.first_seed, asked.first_seed + asked.specimens)
     with Display() as progress:
-        told = make_library(
-            asked.out,
-            asked.file,
-            seeds=seeds,
-            radius_mm=asked.radius_mm,
-            geometry=asked.geometry,
-            workers=asked.workers,
-            progress=progress,
-        )
+        batch = Batch(asked.out, asked.geometry, asked.radius_mm, progress)
+        told = make_library(batch, asked.file, seeds, asked.workers)
     print(told)
 
 

@@ -2,69 +2,46 @@
 
 from __future__ import annotations
 
-import json
-import logging
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.core.errors import InputError, PipelineError
-from pipeline.core.units import MM
-from pipeline.execution.progress import Progress, Silent
+from pipeline.core.errors import InputError
 from pipeline.gap.calibration import Answer, Calibration, calibrated, expected_error
 from pipeline.gap.effects import effect
-from pipeline.gap.library import Entry, nearest, parse
-from pipeline.gap.score import NONE
+from pipeline.study.batch import Batch
 from pipeline.study.gap_library import write_entry
-from pipeline.study.gap_trials import Bench, Trial
+from pipeline.study.gap_trials import Bench, Trial, unseen
 
 SIZES = (0.15, 1.0)  # of the plausible maximum, log-uniform
 
-log = logging.getLogger("pipeline.study")
 
-
-def calibrate(
-    out: Path,
-    file: Path,
-    *,
-    seeds: Sequence[int],
-    effects: int = 6,
-    geometry: str = "seb",
-    radius_mm: float = 1.0,
-    progress: Progress | None = None,
-) -> str:
+def calibrate(batch: Batch, file: Path, seeds: Sequence[int], effects: int = 6) -> str:
     """Make trials, fit the temperature, write it into the library; goes on where it stopped.
 
     Parameters
     ----------
-    out : folder of the trials
     file : library
     seeds : of the specimens, none of the library's
-    effects : int; tests with an effect for every specimen, beside one without
-    geometry, radius_mm : of the tests
+    effects : tests with an effect for every specimen, beside one without
 
     Raises
     ------
     InputError
         for seeds that the library was learnt from, or too few
     """
-    progress = progress or Silent()
-    entry = entry_of(file, geometry, radius_mm)
-    first, last = entry.seeds
-    if any(first <= seed <= last for seed in seeds):
-        raise InputError(f"seeds {first} to {last} made the library: calibrate with others")
+    benches = unseen(batch, file, seeds)
     trials: list[Trial] = []
-    for seed in seeds:
-        progress.stage(f"trials of seed {seed}")
-        bench = Bench(out / f"{geometry}-{radius_mm:g}-{seed:04d}", seed, radius_mm, geometry, entry)
+    for bench in benches:
+        batch.progress.stage(f"trials of seed {bench.seed}")
         trials += specimen_trials(bench, effects)
     answers = [answer(t) for t in trials]
     if len({a.group for a in answers}) < 2:
         raise InputError("a temperature needs trials of at least two specimens")
     found = calibrated(answers)
-    write_entry(file, replace(entry, temperature=found.temperature, tests=found.tests))
+    write_entry(file, replace(benches[0].entry, temperature=found.temperature, tests=found.tests))
     return told(found, answers)
 
 
@@ -77,11 +54,6 @@ def told(found: Calibration, answers: Sequence[Answer]) -> str:
     )
 
 
-def entry_of(file: Path, geometry: str, radius_mm: float) -> Entry:
-    """The entry of a library for a geometry and radius."""
-    return nearest(parse(json.loads(file.read_text("utf-8"))), geometry, radius_mm * MM)
-
-
 def answer(trial: Trial) -> Answer:
     """A trial as the calibration sees it."""
     return Answer(trial.seed, trial.label, trial.log_bayes, trial.tested)
@@ -89,21 +61,12 @@ def answer(trial: Trial) -> Answer:
 
 def specimen_trials(bench: Bench, effects: int) -> list[Trial]:
     """One test without an effect and so many with, of different effects and random size."""
-    found = tried(bench, {})
+    found = bench.tried({})
     if not found:
         return []
     for name, value in drawn(found[0].limits, effects, np.random.default_rng(bench.seed)):
-        found += tried(bench, {name: value})
+        found += bench.tried({name: value})
     return found
-
-
-def tried(bench: Bench, effects: dict[str, float]) -> list[Trial]:
-    """The trial, where it can be simulated."""
-    try:
-        return [bench.trial(effects)]
-    except PipelineError as error:
-        log.warning("a trial of seed %d, %s, is left out: %s", bench.seed, effects or NONE, error)
-        return []
 
 
 def drawn(names: Collection[str], count: int, rng: np.random.Generator) -> list[tuple[str, float]]:

@@ -2,84 +2,64 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.core.errors import InputError, PipelineError
-from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.effects import effect, library
 from pipeline.gap.library import Entry
 from pipeline.gap.score import NONE, names_of
 from pipeline.gap.verdict import CAUSE, CLASS, NONE_NEEDED, OUTSIDE, SURE
-from pipeline.study.gap_calibration import answer, entry_of, sized
-from pipeline.study.gap_trials import Bench, Trial
+from pipeline.study.batch import Batch
+from pipeline.study.gap_calibration import answer, sized
+from pipeline.study.gap_trials import Bench, Trial, unseen
 
 TIMES = (2.0, 4.0)  # detection limits
 HEAD = ("put in", "times limit", "seed", "verdict", "named", "P of it", "estimate, 95 %", "closure, 95 %")
 
-log = logging.getLogger("pipeline.study")
-
 
 def confusion(
-    out: Path,
+    batch: Batch,
     file: Path,
-    *,
     seeds: Sequence[int],
+    *,
     free: Sequence[int] = (),
     names: Sequence[str] = (),
     times: Sequence[float] = TIMES,
     removed: bool = True,
-    geometry: str = "seb",
-    radius_mm: float = 1.0,
-    progress: Progress | None = None,
 ) -> str:
     """Make the trials of the table, write table.md, return the summary; goes on where it stopped.
 
     Parameters
     ----------
-    out : folder
     file : library
     seeds : specimens that carry effects, every effect on one of them after the other; none of library or calibration
     free : further specimens that carry none
     names : effects, all that the diagnosis can test where not given
     times : detection limits, at most the plausible maximum
     removed : whether every effect is also diagnosed by a library that lacks it
-    geometry, radius_mm : of the tests
     """
-    progress, entry = progress or Silent(), entry_of(file, geometry, radius_mm)
-    if any(entry.seeds[0] <= seed <= entry.seeds[1] for seed in (*seeds, *free)):
-        raise InputError(f"seeds {entry.seeds[0]} to {entry.seeds[1]} made the library: take others")
-    benches = [Bench(out / f"{geometry}-{radius_mm:g}-{s:04d}", s, radius_mm, geometry, entry) for s in (*seeds, *free)]
+    benches = unseen(batch, file, [*seeds, *free])
     trials: list[Trial] = []
     for bench in benches:
-        progress.stage(f"seed {bench.seed}, nothing")
-        trials += tried(bench, {})
+        batch.progress.stage(f"seed {bench.seed}, nothing")
+        trials += bench.tried({}, closed=1)
     for k, name in enumerate(names or library()):
         bench = benches[k % len(seeds)]
         for value in sizes(bench, name, times):
-            progress.stage(f"seed {bench.seed}, {name} = {value:g}")
-            trials += tried(bench, {name: value})
+            batch.progress.stage(f"seed {bench.seed}, {name} = {value:g}")
+            trials += bench.tried({name: value}, closed=1)
             if removed:
-                trials += tried(bench, {name: value}, (name,))
-    (out / "table.md").write_text(table(trials, entry), "utf-8")
+                trials += bench.tried({name: value}, (name,), closed=1)
+    entry = benches[0].entry
+    (batch.out / "table.md").write_text(table(trials, entry), "utf-8")
     return summary(trials, entry)
-
-
-def tried(bench: Bench, effects: dict[str, float], without: tuple[str, ...] = ()) -> list[Trial]:
-    """The trial, where it can be simulated."""
-    try:
-        return [bench.trial(effects, without, closed=1)]
-    except PipelineError as error:
-        log.warning("left out: seed %d, %s: %s", bench.seed, effects or NONE, error)
-        return []
 
 
 def sizes(bench: Bench, name: str, times: Sequence[float]) -> list[float]:
     """Different sizes of an effect by the card of the specimen without effects; none where it is not tested."""
-    known = tried(bench, {})
+    known = bench.tried({}, closed=1)
     if not known or name not in known[0].limits:
         return []
     return list(dict.fromkeys(sized(name, known[0].limits[name], t) for t in times))

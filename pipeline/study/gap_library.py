@@ -14,7 +14,6 @@ from pipeline import __version__
 from pipeline.config import RunSettings
 from pipeline.core.errors import ConvergenceError
 from pipeline.core.units import MM
-from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.diagnosis import baseline, with_placements, with_signatures
 from pipeline.gap.discrepancy import ALL, KNOTS, Discrepancy
@@ -33,10 +32,10 @@ from pipeline.store.results import prepare_output
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import build_model
+from pipeline.study.batch import Batch
 from pipeline.study.diagnose_case import ENGINE, Simulator, band_of
 from pipeline.study.diagnose_sight import beside, seen
 from pipeline.study.engines import engine as engine_of
-from pipeline.study.virtual_test import virtual_test
 
 FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
@@ -70,16 +69,7 @@ def provisional(geometry: str) -> Entry:
     return Entry(Domain(geometry, (0.0, 1.0), 1.0, NOISE), assumed(), 1.0, 0, {})
 
 
-def make_library(
-    out: Path,
-    file: Path,
-    *,
-    seeds: Sequence[int],
-    geometry: str = "seb",
-    radius_mm: float = 1.0,
-    workers: int | None = None,
-    progress: Progress | None = None,
-) -> str:
+def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | None = None) -> str:
     """Make virtual tests, fit them, learn how they differ, write the entry; goes on where it stopped.
 
     The grids of the specimens are laid twice: with what is assumed before anything is known, and with what was learnt
@@ -89,23 +79,19 @@ def make_library(
 
     Parameters
     ----------
-    out : folder for tests and simulations
     file : library; an entry of the same geometry and radius is replaced, others stay
-    seeds : of the virtual tests, at least four, without gaps
-    geometry, radius_mm : of the tests
+    seeds : of the specimens, at least four, without gaps
     """
-    progress, entry = progress or Silent(), provisional(geometry)
-    radius = radius_mm * MM
+    entry, radius = provisional(batch.geometry), batch.radius_mm * MM
     for turn in ("a first", "a second"):
         specimens = []
         for seed in seeds:
-            progress.stage(f"specimen of seed {seed}, {turn} time")
-            folder = out / f"{geometry}-{radius_mm:g}-{seed:04d}"
+            batch.progress.stage(f"specimen of seed {seed}, {turn} time")
             try:
-                specimens.append(one_specimen(folder, seed, geometry, radius_mm, workers, progress, entry))
+                specimens.append(one_specimen(batch, seed, workers, entry))
             except ConvergenceError as error:
                 log.warning("the specimen of seed %d is left out: %s", seed, error)
-        domain = Domain(geometry, (REACH[0] * radius, REACH[1] * radius), _last(specimens), NOISE)
+        domain = Domain(batch.geometry, (REACH[0] * radius, REACH[1] * radius), _last(specimens), NOISE)
         entry = replace(learnt(specimens, domain), seeds=(seeds[0], seeds[-1]))
     write_entry(file, entry)
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
@@ -130,12 +116,10 @@ def same(one: Domain, two: Domain) -> bool:
     return one.geometry == two.geometry and bool(np.allclose(one.radius, two.radius, rtol=1e-6))
 
 
-def one_specimen(
-    folder: Path, seed: int, geometry: str, radius_mm: float, workers: int | None, progress: Progress, entry: Entry
-) -> Specimen:
+def one_specimen(batch: Batch, seed: int, workers: int | None, entry: Entry) -> Specimen:
     """A virtual test without effects and the diagnosing model's baseline of it."""
-    if not (folder / "truth.json").exists():
-        virtual_test(folder, seed=seed, geometry=geometry, radius_mm=radius_mm)
+    folder = batch.folder(seed)
+    batch.make(folder, seed)
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
     bundle = read_bundle(folder)
     settings = RunSettings(workers=workers)
@@ -143,7 +127,7 @@ def one_specimen(
     store = SimulationStore(prepare_output(folder / "simulations"))
     simulator = Simulator(
         model, look.observation.sight.points, look.abscissae, None, engine_of(ENGINE), store, settings.accuracy,
-        settings.workers, progress,
+        settings.workers, batch.progress,
     )  # fmt: skip
     start = start_parameters(bundle)
     band = band_of(look, simulator, start)

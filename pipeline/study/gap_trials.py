@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import logging
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,25 +12,28 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import RunSettings
+from pipeline.core.errors import InputError, PipelineError
 from pipeline.core.units import MM
 from pipeline.execution.here import Here
 from pipeline.execution.progress import Silent
 from pipeline.gap.diagnosis import Diagnosis, diagnose
 from pipeline.gap.effects import library
-from pipeline.gap.library import Entry
+from pipeline.gap.library import Entry, parse
 from pipeline.gap.score import NONE
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import read_bundle
 from pipeline.store.results import plain
 from pipeline.store.start import start_parameters
+from pipeline.study.batch import Batch
 from pipeline.study.diagnose_case import ENGINE, Case, prepared
 from pipeline.study.diagnose_result import estimate
 from pipeline.study.diagnose_sight import beside, seen
 from pipeline.study.effects import Band
-from pipeline.study.virtual_test import virtual_test
 
 FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 NEAR = 1.5 * MM  # paths so near are one: tests of one specimen then share their simulations
+
+log = logging.getLogger("pipeline.study")
 
 
 @dataclass(frozen=True)
@@ -74,24 +78,48 @@ class Trial:
         return " + ".join(sorted(self.effects)) or NONE
 
 
+def unseen(batch: Batch, file: Path, seeds: Sequence[int]) -> list[Bench]:
+    """A bench a seed, judged by the entry of a library that has not seen the specimens.
+
+    Raises
+    ------
+    InputError
+        for seeds that the library was learnt from
+    """
+    entry = batch.entry(parse(json.loads(file.read_text("utf-8"))))
+    first, last = entry.seeds
+    if any(first <= seed <= last for seed in seeds):
+        raise InputError(f"seeds {first} to {last} made the library: take others")
+    return [Bench(batch, seed, entry) for seed in seeds]
+
+
 @dataclass(frozen=True, eq=False)
 class Bench:
     """One specimen on which trials are made; those whose cracks agree share their simulations.
 
     Parameters
     ----------
-    folder : Path
+    batch : Batch of the specimen
     seed : int
-    radius_mm : float
-    geometry : str
     entry : Entry to judge by
     """
 
-    folder: Path
+    batch: Batch
     seed: int
-    radius_mm: float
-    geometry: str
     entry: Entry
+
+    @property
+    def folder(self) -> Path:
+        """Of all trials on the specimen."""
+        return self.batch.folder(self.seed)
+
+    def tried(self, effects: Mapping[str, float], without: tuple[str, ...] = (), closed: int = 0) -> list[Trial]:
+        """The trial; none where it cannot be simulated."""
+        try:
+            return [self.trial(effects, without, closed)]
+        except PipelineError as error:
+            log.warning("left out: seed %d, %s: %s", self.seed, dict(effects) or NONE, error)
+            return []
 
     def trial(self, effects: Mapping[str, float], without: tuple[str, ...] = (), closed: int = 0) -> Trial:
         """Make a test, diagnose it; found again where it was made before.
@@ -111,9 +139,7 @@ class Bench:
 
     def _made(self, name: str, effects: dict[str, float], without: tuple[str, ...], closed: int) -> Trial:
         bundle = self.folder / "tests" / name
-        if not (bundle / "truth.json").exists():
-            asked = sorted(effects.items())
-            virtual_test(bundle, seed=self.seed, geometry=self.geometry, radius_mm=self.radius_mm, effect=asked)
+        self.batch.make(bundle, self.seed, effects)
         truth = json.loads((bundle / "truth.json").read_text("utf-8"))
         case = self._case(bundle)
         names = [n for n in library() if n not in without]

@@ -12,6 +12,7 @@ from pipeline.core.errors import InputError
 from pipeline.gap.effects import effect, library
 from pipeline.gap.library import shipped
 from pipeline.store.results import plain
+from pipeline.study.batch import Batch
 from pipeline.study.gap_calibration import answer, calibrate, drawn, sized
 from pipeline.study.gap_confusion import summary, table
 from pipeline.study.gap_trials import Trial, _apart, read_trial
@@ -92,7 +93,7 @@ def test_the_librarys_own_specimens_are_refused(tmp_path):
 
     file.write_text(written([replace(shipped()[0], seeds=(9000, 9023))], {}), "utf-8")
     with pytest.raises(InputError, match="made the library"):
-        calibrate(tmp_path, file, seeds=[9023, 9024])
+        calibrate(Batch(tmp_path), file, [9023, 9024])
 
 
 def test_paths_lie_apart_where_both_are():

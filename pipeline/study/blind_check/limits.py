@@ -16,22 +16,21 @@ import numpy as np
 from pipeline import __version__
 from pipeline.config import RunSettings
 from pipeline.core.errors import InputError, PipelineError
-from pipeline.core.units import MM
 from pipeline.execution.here import Here
-from pipeline.execution.progress import Progress, Silent
+from pipeline.execution.progress import Silent
 from pipeline.gap.diagnosis import diagnose
 from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED, Card
 from pipeline.gap.library import FILE as LIBRARY
-from pipeline.gap.library import nearest, shipped
+from pipeline.gap.library import shipped
 from pipeline.store import creep
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import read_bundle
 from pipeline.store.results import plain
 from pipeline.store.start import start_parameters
+from pipeline.study.batch import Batch
 from pipeline.study.blind_check.creep import creep_record
 from pipeline.study.diagnose_case import ENGINE, prepared
-from pipeline.study.virtual_test import virtual_test
 
 FILE, FORMAT = "limits.json", 1
 FIRST_SEED = 9400  # of the specimens: neither the library's nor of its trials
@@ -113,41 +112,31 @@ def _whole(rows: Mapping[str, float]) -> dict[str, float]:
     return {n: float(rows.get(n, np.inf)) for n in library()}
 
 
-def make_limits(
-    out: Path,
-    file: Path,
-    *,
-    seeds: Sequence[int],
-    geometry: str = "seb",
-    radius_mm: float = 1.0,
-    progress: Progress | None = None,
-) -> str:
+def make_limits(batch: Batch, file: Path, seeds: Sequence[int]) -> str:
     """Diagnose effect-free virtual tests, write the medians of their cards; goes on where it stopped.
 
     Parameters
     ----------
-    out : folder of tests and simulations
     file : written; an entry of the same geometry and radius is replaced, others stay
-    seeds : of the virtual tests
+    seeds : of the specimens
     """
-    progress, cards = progress or Silent(), []
+    cards = []
     for seed in seeds:
-        progress.stage(f"effect-free test of seed {seed}")
+        batch.progress.stage(f"effect-free test of seed {seed}")
         try:
-            cards.append(card_of(out / f"{geometry}-{radius_mm:g}-{seed:04d}", seed, geometry, radius_mm))
+            cards.append(card_of(batch, seed))
         except PipelineError as error:
             log.warning("seed %d is left out: %s", seed, error)
     if not cards:
         raise InputError("no effect-free test could be diagnosed: there are no limits to be written")
-    known = nearest(shipped(), geometry, radius_mm * MM)
     rows = medians(cards)
     entry = {
-        "geometry": geometry,
-        "radius_mm": radius_mm,
+        "geometry": batch.geometry,
+        "radius_mm": batch.radius_mm,
         "seeds": [seeds[0], seeds[-1]],
         "tests": len(cards),
         "version": __version__,
-        "temperature": known.temperature,
+        "temperature": batch.entry(shipped()).temperature,
         "library_sha256": library_digest(),
         "effects": rows,
     }
@@ -156,19 +145,19 @@ def make_limits(
     return f"{len(cards)} effect-free tests; {seen} of {len(library())} effects have a detection limit"
 
 
-def card_of(folder: Path, seed: int, geometry: str, radius_mm: float) -> Card:
+def card_of(batch: Batch, seed: int) -> Card:
     """The card of one effect-free virtual test by the library that ships."""
+    folder = batch.folder(seed)
     bundle = folder / "test"
-    if not (bundle / "truth.json").exists():
-        virtual_test(bundle, seed=seed, geometry=geometry, radius_mm=radius_mm)
+    batch.make(bundle, seed)
     if not (bundle / creep.FILE).exists():  # as in the sealed bundles
         write_atomically(bundle / creep.FILE, creep.encode_creep(creep_record(read_bundle(bundle).experiment)))
     settings = RunSettings(workers=1)
     case = prepared(read_bundle(bundle), folder / "diagnosis", ENGINE, settings, Silent(), Here())
-    entry = nearest(shipped(), geometry, radius_mm * MM)
     rng = np.random.default_rng(seed)
     start = start_parameters(case.bundle)
-    return diagnose(case.look.observation, case.look.abscissae, case.simulator, start, entry, rng, closed=0).card
+    look, entry = case.look, batch.entry(shipped())
+    return diagnose(look.observation, look.abscissae, case.simulator, start, entry, rng, closed=0).card
 
 
 def medians(cards: Sequence[Card]) -> dict[str, dict[str, float | None]]:

@@ -1,0 +1,44 @@
+"""A batch of specimens of engine B, of one geometry and radius, on which the diagnosis learns or is tried."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipeline.core.units import MM
+from pipeline.execution.progress import Progress, Silent
+from pipeline.gap.library import Entry, nearest
+from pipeline.study.virtual_test import virtual_test
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Where the specimens lie, one a seed, and what they are.
+
+    Parameters
+    ----------
+    out : folder of tests and simulations; a run that was stopped goes on in it
+    geometry : str
+    radius_mm : float
+    progress : who is told
+    """
+
+    out: Path
+    geometry: str = "seb"
+    radius_mm: float = 1.0
+    progress: Progress = field(default_factory=Silent)
+
+    def folder(self, seed: int) -> Path:
+        """The folder of a specimen."""
+        return self.out / f"{self.geometry}-{self.radius_mm:g}-{seed:04d}"
+
+    def entry(self, entries: list[Entry]) -> Entry:
+        """The entry of a library to judge the specimens by."""
+        return nearest(entries, self.geometry, self.radius_mm * MM)
+
+    def make(self, bundle: Path, seed: int, effects: Mapping[str, float] | None = None) -> None:
+        """Make a virtual test with effects, if it was not made before."""
+        if not (bundle / "truth.json").exists():
+            asked = sorted((effects or {}).items())
+            virtual_test(bundle, seed=seed, geometry=self.geometry, radius_mm=self.radius_mm, effect=asked)

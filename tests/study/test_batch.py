@@ -1,0 +1,37 @@
+"""A batch of specimens: one folder each, and no test made twice."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.gap.library import shipped
+from pipeline.study.batch import Batch
+
+
+def test_specimens_of_other_kinds_lie_apart(tmp_path):
+    batches = [Batch(tmp_path), Batch(tmp_path, "dct"), Batch(tmp_path, radius_mm=1.5)]
+    folders = [batch.folder(seed) for batch in batches for seed in (1, 2)]
+    assert len(set(folders)) == 6
+    assert folders[0] == tmp_path / "seb-1-0001"  # what earlier runs left is found again
+
+
+def test_a_test_is_made_once_with_what_was_asked_for(tmp_path, monkeypatch):
+    made = []
+
+    def virtual_test(out, **asked):
+        made.append(asked)
+        out.mkdir()
+        (out / "truth.json").touch()
+
+    monkeypatch.setattr("pipeline.study.batch.virtual_test", virtual_test)
+    for _ in range(2):
+        Batch(tmp_path, "dct", 1.5).make(tmp_path / "test", 7, {"modulus": 0.1, "creep": 1.0})
+    effect = [("creep", 1.0), ("modulus", 0.1)]
+    assert made == [{"seed": 7, "geometry": "dct", "radius_mm": 1.5, "effect": effect}]
+
+
+def test_the_entry_is_of_the_geometry_and_radius(tmp_path):
+    [one, *_] = shipped()
+    assert Batch(tmp_path, one.domain.geometry, 1e3 * one.domain.radius[0]).entry([one]) is one
+    with pytest.raises(ValueError, match="is empty"):
+        Batch(tmp_path).entry([])
