@@ -30,6 +30,7 @@ class Sight:
     pull : (2,) array; unit vector along which a yielding fixture lets the specimen go
     end_cmod : float, m; of the whole record
     contacts : (c, 2) array, m; of machine and specimen, for naming regions
+    load : (s,) array, N; what the load cell said, NaN where nothing; empty: nothing anywhere
     """
 
     cmod: np.ndarray
@@ -43,6 +44,7 @@ class Sight:
     pull: np.ndarray
     end_cmod: float
     contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    load: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if self.time.shape != self.cmod.shape or self.side.shape != self.points.shape[:1]:
@@ -50,6 +52,8 @@ class Sight:
                 f"a sight has {self.cmod.size} stations with {self.time.size} times and {len(self.points)} points with "
                 f"{self.side.size} sides: there must be as many"
             )
+        if self.load.size not in (0, self.cmod.size):
+            raise InputError(f"a sight of {self.cmod.size} stations has {self.load.size} loads: there must be as many")
         if not (self.peak_cmod > 0 and self.corner > 0):
             raise InputError(
                 f"peak_cmod = {self.peak_cmod:g} m and corner = {self.corner:g} m of a sight must be positive"

@@ -34,7 +34,7 @@ def whole_curve(diagnosis: Diagnosis, fitted: Fitted) -> tuple[np.ndarray, np.nd
     cmod = np.linspace(0.0, sight.cmod[-1], ROWS + 1)[1:]
     rest = sight.time[0] - sight.cmod[0] * (sight.time[1] - sight.time[0]) / (sight.cmod[1] - sight.cmod[0])
     time = np.interp(cmod, np.append(0.0, sight.cmod), np.append(rest, sight.time))
-    dense = replace(diagnosis.emulator, sight=replace(sight, cmod=cmod, time=time))
+    dense = replace(diagnosis.emulator, sight=replace(sight, cmod=cmod, time=time, load=np.zeros(0)))
     return cmod, dense.reading(fitted.parameters, fitted.candidate.names, fitted.amplitudes).load
 
 

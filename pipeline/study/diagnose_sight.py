@@ -86,7 +86,7 @@ def _observation(
 ) -> Observation:
     specimen = bundle.specimen
     points, values, std = _picked(bundle, curve, field, stations)
-    peak = stations[0] if bundle.curve is None else curve.peak()[0]
+    peak, load = stations[0] if bundle.curve is None else curve.peak()[0], curve.load_at(stations)
     low, high = (points.min(axis=0), points.max(axis=0)) if field is None else _view(field)
     sight = Sight(
         cmod=stations,
@@ -100,8 +100,8 @@ def _observation(
         pull=pull(specimen),
         end_cmod=float(curve.cmod.max()),
         contacts=contacts(specimen),
+        load=load,
     )
-    load = curve.load_at(stations)
     load_std = (
         np.full(stations.size, np.nan) if curve.load_std is None else np.interp(stations, curve.cmod, curve.load_std)
     )

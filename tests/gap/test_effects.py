@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,16 @@ def test_no_physics_is_the_plan_as_it_was(name):
 def test_a_fixture_of_20_um_per_kn_lets_go_40_um_under_2_kn():
     _, found = act("fixture_compliance_um_per_kn", 20.0, load=np.full(13, 2000.0))
     assert np.allclose(found.field, (0.0, -40e-6))
+
+
+def test_a_fixture_follows_the_measured_load_where_there_is_one():
+    """What the simulated load is off does not show in fields."""
+    seen, half = sight(), np.where(np.arange(13) < 6, 1000.0, np.nan)
+    one, reading = effect("fixture_compliance_um_per_kn"), Reading(np.zeros((13, 16, 2)), np.full(13, 2000.0))
+    found = one.distort(np.array([20.0]), replace(seen, load=half), reading)
+    assert np.allclose(found.field[:6], (0.0, -20e-6))
+    assert np.allclose(found.field[6:], (0.0, -40e-6))
+    assert np.array_equal(found.load, reading.load)
 
 
 def test_a_frame_two_seconds_late_shows_an_earlier_opening():
