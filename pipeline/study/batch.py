@@ -22,12 +22,14 @@ class Batch:
     geometry : str
     radius_mm : float
     progress : who is told
+    creep : file with the creep compliance of the mastic, or None; every test gets it as its creep test
     """
 
     out: Path
     geometry: str = "seb"
     radius_mm: float = 1.0
     progress: Progress = field(default_factory=Silent)
+    creep: Path | None = None
 
     def folder(self, seed: int) -> Path:
         """The folder of a specimen."""
@@ -40,5 +42,8 @@ class Batch:
     def make(self, bundle: Path, seed: int, effects: Mapping[str, float] | None = None) -> None:
         """Make a virtual test with effects, if it was not made before."""
         if not (bundle / "truth.json").exists():
-            asked = sorted((effects or {}).items())
-            virtual_test(bundle, seed=seed, geometry=self.geometry, radius_mm=self.radius_mm, effect=asked)
+            of_all = {"creep": 0.0} if self.creep else {}
+            asked = sorted((of_all | dict(effects or {})).items())
+            virtual_test(
+                bundle, seed=seed, geometry=self.geometry, radius_mm=self.radius_mm, creep=self.creep, effect=asked
+            )

@@ -29,8 +29,8 @@ from pipeline.store.bundle import read_bundle
 from pipeline.store.results import plain
 from pipeline.store.start import start_parameters
 from pipeline.study.batch import Batch
-from pipeline.study.blind_check.creep import creep_record
 from pipeline.study.diagnose_case import ENGINE, prepared
+from pipeline.study.typical_creep import creep_record
 
 FILE, FORMAT = "limits.json", 1
 FIRST_SEED = 9400  # of the specimens: neither the library's nor of its trials

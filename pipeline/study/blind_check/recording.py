@@ -18,10 +18,10 @@ from pipeline.dic.camera import View
 from pipeline.dic.speckle import Camera as Lens
 from pipeline.dic.speckle import Speckle, photograph
 from pipeline.store.new import Contents, write_bundle
-from pipeline.study.blind_check import creep
 from pipeline.study.blind_check.cases import NOISE, Case, Size
 from pipeline.study.blind_check.specimens import Drawn
 from pipeline.study.photography import camera_frame, view_of
+from pipeline.study.typical_creep import creep_record
 from pipeline.study.virtual_test import CAMERA_MM_PER_PX
 
 CLOSE = (0.3, 0.6)  # share of the loading, in which this share of the frames is taken
@@ -75,7 +75,7 @@ def write_case(
     recorder = Recorder(setup, path, drawn.specimen, camera, spoiling)
     noise = {"load_std_n": load_std} | ({} if case.images else {"displacement_std_mm": displacement_std / MM})
     e = e.model_copy(update={"noise": e.noise.model_copy(update={k: float(f"{v:.4g}") for k, v in noise.items()})})
-    contents = Contents(recorder.curve(of_record), labels=drawn.labels, creep=creep.creep_record(e))
+    contents = Contents(recorder.curve(of_record), labels=drawn.labels, creep=creep_record(e))
     if case.images:
         of_dic = {"sync_offset_s": 0.0, "grid_step_px": size.step_px}
         e = e.model_copy(update={"camera": frame, "dic": e.dic.model_copy(update=of_dic)})

@@ -17,7 +17,7 @@ from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
 from pipeline.store.experiment import Experiment
-from pipeline.study.blind_check import creep
+from pipeline.study import typical_creep as creep
 from pipeline.study.blind_check.cases import STRANGERS, Case, Size
 from pipeline.study.virtual_test import Request, prepare
 

@@ -1,4 +1,4 @@
-"""The creep test of the mastic that lies in every bundle of a check."""
+"""The creep test of the mastic that lies in every bundle on which the diagnosis is tried."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ AT = np.geomspace(0.1, 300.0, 40)  # s
 def creep_record(experiment: Experiment) -> CreepRecord:
     """Compliance of a Burgers body whose instant stiffness is the mastic's."""
     assert experiment.material.mastic_modulus_gpa is not None
-    d1 = 1 / (experiment.material.mastic_modulus_gpa * GPA)
+    return burgers_record(experiment.material.mastic_modulus_gpa * GPA)
+
+
+def burgers_record(modulus: float) -> CreepRecord:
+    """The same for an instant stiffness in Pa."""
     growth = AT / FLOW + SHARE * -np.expm1(-AT / TIME)
-    return CreepRecord(AT, d1 * (1 + growth))
+    return CreepRecord(AT, (1 + growth) / modulus)
