@@ -145,7 +145,8 @@ def diagnose(
     entry = fitted_to(entry, observation, emulator, near)
     if entry.discrepancy.placements > 0:
         emulator = with_placements(emulator, counted, emulator.rounded(near.parameters))
-    needed = sorted({*wanted, *entry.apparent})  # what specimens only seem to have counts whether it is tested or not
+    seeming = {n for n in entry.apparent if n in library()}
+    needed = sorted({*wanted, *seeming})  # what specimens only seem to have counts whether it is tested or not
     emulator, missing = with_signatures(emulator, counted, emulator.rounded(near.parameters), needed)
     untested = {n: why for n, why in missing.items() if n in wanted}
     known = [n for n in wanted if n not in untested]
@@ -169,7 +170,7 @@ def concluded(
     observation, data = weighed(observation, emulator, entry)
     fits, scored = _Look(observation, data, known, entry.temperature).judge(emulator)
     singles = {n: emulator.candidate([n], observation.mask) for n in known}
-    best = fits[scored.ranked()[0]]
+    best = fits[scored.first()]  # a wave that may have any shape would pass every gate
     table = card(singles, data, best.parameters, entry.temperature)
     left = data.target - best.candidate.predict(best.parameters, best.amplitudes)
     judged = gate(observation, left, uncertain(best, data), entry.freedom)
@@ -184,7 +185,7 @@ def concluded(
         card=table,
         gate=judged,
         cells=where(observation, residual, data.metric.covariance),
-        closures=closures(observation, data, fits, scored, rng, closed),
+        closures=closures(observation, emulator, data, fits, scored, rng, closed),
         noise_bic=noise_bic(observation, data, fits),
         verdict=on_the_edge(best) if best.at_edge else verdict(scored, table, judged),
         untested=untested,
@@ -223,7 +224,7 @@ def baseline(
         emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values, clear=clear)
         look = _Look(*weighed(observation, emulator, entry), measuring, entry.temperature)
         fits, scored = look.judge(emulator, with_pairs=False)
-        best = fits[scored.ranked()[0]]
+        best = fits[scored.first()]
         steps = [int(x > high) - int(x < low) for x, (low, high) in zip(best.parameters, emulator.inner, strict=True)]
         moved = design.moved(*steps)
         if moved == design:
@@ -347,13 +348,14 @@ def _run_of(found: Fitted) -> Run:
 
 def closures(
     observation: Observation,
+    emulator: Emulator,
     data: Data,
     fits: Mapping[str, Fitted],
     scored: Scored,
     rng: np.random.Generator,
     closed: int = CLOSED,
 ) -> dict[str, Closure]:
-    """Closure of the best explanations, the runner-up's beside the first's."""
+    """Closure of the best explanations, the runner-up's beside the first's; none is told a load that is held out."""
     within, across = folds(observation)
     if not within or not closed:
         return {}
@@ -362,6 +364,7 @@ def closures(
     complete = left_by_complete(best.candidate, data, within, best.parameters, rng)
     found = {}
     for label in scored.causes()[:closed]:
-        other = held_out(fits[label].candidate, data, within + across, fits[label].parameters)
+        candidate = emulator.unloaded().candidate(fits[label].candidate.names, observation.mask)
+        other = held_out(candidate, data, within + across, fits[label].parameters)
         found[label] = closure(observation, data, none, other, complete, rng.spawn(1)[0])
     return found

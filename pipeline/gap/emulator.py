@@ -268,6 +268,10 @@ class Emulator:
         rows = [signatures[name].off(value) for name, value in physics.items()]
         return np.reshape(rows, (len(rows), 2 * self.sight.cmod.size * len(self.sight.points) + self.sight.cmod.size))
 
+    def unloaded(self) -> Emulator:
+        """The same, told nothing of the measured load."""
+        return replace(self, sight=replace(self.sight, load=np.zeros(0)))
+
     def confirmed(self, parameters: np.ndarray, simulated: np.ndarray) -> Emulator:
         """Moved by what a simulation without effects at these parameters, `Response.flat` (n,), says otherwise."""
         return replace(self, offset=self.offset + simulated - self.response(parameters, {}).flat())

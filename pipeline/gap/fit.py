@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtri
 
 from pipeline.gap.candidate import Candidate
-from pipeline.gap.metric import Metric, doubted
+from pipeline.gap.metric import Metric, doubted, doubting
 
 STEP = 1e-3  # of the box, and of an amplitude's scale: central differences
 COARSE, FINE, REACH = 13, 25, 5.0  # nodes over the bounds; nodes over ± REACH standard deviations
@@ -227,33 +227,45 @@ def climbed(candidate: Candidate, data: Data, at: np.ndarray, turns: int = 12) -
 def _profile(candidate: Candidate, data: Data, best: Point) -> Callable[[np.ndarray], float]:
     """log ∫ likelihood over the parameters by Laplace, as a function of the amplitudes held.
 
-    The parameters follow by chords, with the derivatives of the best point, in which they are nearly linear.
+    The parameters follow by chords, with the derivatives of the best point, in which they are nearly linear; data count
+    as little as the candidate doubts them at these amplitudes.
     """
     at, _, slopes, _ = best
     q = len(data.box)
     free, bound = slopes[:, :q], slopes[:, q:]
-    solve = np.linalg.pinv(free * data.width, rcond=1e-9) * data.width[:, None]
-    follow = solve @ bound
-    _, determinant = np.linalg.slogdet(free.T @ free)
-    constant = 0.5 * q * float(np.log(2 * np.pi)) - 0.5 * float(determinant)
+    follow = _chord(free, data) @ bound
 
     def profile(node: np.ndarray) -> float:
+        doubt = data.doubt(candidate, node)
+        told = doubting(doubt)
+        seen = told(free)
+        solve = _chord(seen, data)
         here = np.append(at[:q] - follow @ (node - at[q:]), node)
         here[:q] = np.clip(here[:q], *data.box.T)
         residual = data.residual(candidate, here)
         for _ in range(CHORDS):
             moved = here.copy()
-            moved[:q] = np.clip(here[:q] + solve @ residual, *data.box.T)
+            moved[:q] = np.clip(here[:q] + solve @ told(residual), *data.box.T)
             left = data.residual(candidate, moved)
-            gained = residual @ residual - left @ left
+            gained = _square(told(residual)) - _square(told(left))
             if gained <= 0:
                 break
             here, residual = moved, left
             if gained < SETTLED:
                 break
-        return data.metric.log_likelihood(residual, data.doubt(candidate, node)) + constant
+        volume = 0.5 * q * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(seen.T @ seen)[1]
+        return data.metric.log_likelihood(residual, doubt) + float(volume)
 
     return profile
+
+
+def _chord(free: np.ndarray, data: Data) -> np.ndarray:
+    """What takes a white residual (n,) to a step of the parameters; (q, n)."""
+    return np.asarray(np.linalg.pinv(free * data.width, rcond=1e-9) * data.width[:, None])
+
+
+def _square(values: np.ndarray) -> float:
+    return float(values @ values)
 
 
 def _nodes(candidate: Candidate, data: Data, best: Point) -> tuple[np.ndarray, np.ndarray]:

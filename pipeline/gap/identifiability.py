@@ -138,24 +138,38 @@ def _limit(signal: _Signal, largest: float, root: float) -> float:
 
 
 def _remaining(signal: _Signal, value: float, competitor: _Signal) -> float:
-    """The least that a competitor leaves of an effect of this size, whatever its direction and sign."""
+    """The least that a competitor leaves of an effect of this size, whatever its direction and sign.
+
+    Data count as little as both doubt them.
+    """
     size = competitor.candidate.magnitudes[0]
-    both = [size.high * row for row in np.eye(2)] if size.directions == 2 else competitor.all(size.high)
-    trials = [competitor.change(a) for a in both]
-    found = []
+    found: list[float] = []
     for amplitudes in signal.all(value):
-        doubt = signal.doubt(amplitudes)
-        change = signal.left(signal.change(amplitudes), doubt)
-        others = [signal.left(t, doubt) for t in trials]
+        change, doubt = signal.change(amplitudes), signal.doubt(amplitudes)
         if size.directions == 2:
-            basis = np.column_stack(others)
-            found.append(np.linalg.norm(change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]))
+            trials = [competitor.change(size.high * row) for row in np.eye(2)]
+            basis, left = signal.left(np.column_stack(trials), doubt), signal.left(change, doubt)
+            found.append(float(np.linalg.norm(left - basis @ np.linalg.lstsq(basis, left, rcond=None)[0])))
             continue
-        for trial in others:
-            power = float(trial @ trial)
-            share = np.clip(trial @ change / power, 0.0, 1.0) if power > 0 else 0.0
-            found.append(np.linalg.norm(change - share * trial))
-    return float(min(found))
+        for other in competitor.all(size.high):
+            trial = competitor.change(other)
+            share, _ = _taken(signal.left(change, doubt), signal.left(trial, doubt))
+            both = joined(doubt, competitor.doubt(share * other))
+            found.append(_taken(signal.left(change, both), signal.left(trial, both))[1])
+    return min(found)
+
+
+def _taken(change: np.ndarray, trial: np.ndarray) -> tuple[float, float]:
+    """The share, none to one, of a trial that takes most off a change, and how much is left."""
+    power = float(trial @ trial)
+    share = float(np.clip(trial @ change / power, 0.0, 1.0)) if power > 0 else 0.0
+    return share, float(np.linalg.norm(change - share * trial))
+
+
+def joined(*doubts: np.ndarray | None) -> np.ndarray | None:
+    """Several doubts (n, j) as one; None: none."""
+    some = [doubt for doubt in doubts if doubt is not None]
+    return np.hstack(some) if some else None
 
 
 def classes(names: tuple[str, ...], limit: np.ndarray, remaining: np.ndarray) -> tuple[tuple[str, ...], ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
@@ -14,10 +14,12 @@ import numpy as np
 from pipeline.core.errors import InputError
 from pipeline.core.units import MM, UM
 from pipeline.gap.discrepancy import ALL, Discrepancy
+from pipeline.gap.effects import effect, library
 from pipeline.gap.modes import LOAD
 from pipeline.gap.observation import Observation
 
 FILE, FORMAT = "library.json", 3
+HOLDS = (0.75, 1.5)  # of the radius that it was learnt at: where an entry holds
 ENOUGH = 20  # tests behind a temperature
 SIZES = np.where([mode == LOAD for mode in ALL], 1e-2, UM)  # units of amplitudes in the file: µm, per cent of the load
 
@@ -38,6 +40,11 @@ class Domain:
     radius: tuple[float, float]
     cmod: float
     noise: tuple[float, float]
+
+    @property
+    def learnt_at(self) -> float:
+        """The radius of the diagnosing particles, m."""
+        return self.radius[0] / HOLDS[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +116,8 @@ def shipped() -> list[Entry]:
 def nearest(entries: list[Entry], geometry: str, radius: float) -> Entry:
     """The entry to judge a test by: of its geometry where there is one, of the radius nearest in proportion.
 
+    What is due to the size of particles is in proportion to the radius (m) of the test at hand.
+
     Raises
     ------
     InputError
@@ -117,7 +126,10 @@ def nearest(entries: list[Entry], geometry: str, radius: float) -> Entry:
     if not entries:
         raise InputError("the library of discrepancies is empty: make it with scripts/gap_library")
     own = [e for e in entries if e.domain.geometry == geometry] or entries
-    return min(own, key=lambda e: abs(np.log(radius / np.sqrt(e.domain.radius[0] * e.domain.radius[1]))))
+    entry = min(own, key=lambda e: abs(np.log(radius / np.sqrt(e.domain.radius[0] * e.domain.radius[1]))))
+    finer = radius / entry.domain.learnt_at
+    scaled = {n: v * (finer if n in library() and effect(n).coarseness else 1.0) for n, v in entry.apparent.items()}
+    return replace(entry, apparent=scaled)
 
 
 def parse(raw: Mapping[str, Any]) -> list[Entry]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,10 +98,16 @@ class Metric:
 
 def doubted(white: np.ndarray, doubt: np.ndarray | None) -> np.ndarray:
     """(I + B Bᵀ)^(−1/2) times white values (n,) or (n, k): what is left where data are uncertain by B (n, j)."""
+    return doubting(doubt)(white)
+
+
+def doubting(doubt: np.ndarray | None) -> Callable[[np.ndarray], np.ndarray]:
+    """The same as a function of the values."""
     if doubt is None or not doubt.size:
-        return white
+        return lambda white: white
     shape, strength, _ = np.linalg.svd(doubt, full_matrices=False)
-    return np.asarray(white - (shape * (1 - 1 / np.sqrt(1 + strength**2))) @ (shape.T @ white))
+    less = shape * (1 - 1 / np.sqrt(1 + strength**2))
+    return lambda white: np.asarray(white - less @ (shape.T @ white))
 
 
 def _log_density(residual: np.ndarray, variance: np.ndarray, doubt: np.ndarray | None) -> float:

@@ -31,6 +31,10 @@ class Scored:
         """Labels, the most probable first."""
         return sorted(self.probability, key=lambda label: (-self.probability[label], label))
 
+    def first(self) -> str:
+        """The most probable label that is none or names effects: a model that predicts something."""
+        return next(label for label in self.ranked() if label != UNLISTED)
+
     def causes(self) -> list[str]:
         """Labels that name effects, the most probable first."""
         return [label for label in self.ranked() if names_of(label)]
@@ -63,6 +67,8 @@ def order_of(label: str) -> int:
 def inclusion(effects: int) -> float:
     """Prior odds of one effect where each of so many is there or not by itself, and none with `P_NONE`.
 
+    What the library lacks counts as one more of them.
+
     (1 + odds)^−effects = P_NONE; a pair then has the odds of its members multiplied.
     """
     return float(P_NONE ** (-1 / max(effects, 1)) - 1)
@@ -84,7 +90,7 @@ def score(log_evidence: Mapping[str, float], effects: int, temperature: float = 
 
 def from_bayes(log_bayes: Mapping[str, float], effects: int, temperature: float = 1.0) -> Scored:
     """Probabilities from log Bayes factors; arguments as of `score`."""
-    odds = np.log(inclusion(effects))
+    odds = np.log(inclusion(effects + (UNLISTED in log_bayes)))
     weight = np.array([log_bayes[label] / temperature + order_of(label) * odds for label in log_bayes])
     share = np.exp(weight - weight.max())
     share /= share.sum()

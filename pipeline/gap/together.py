@@ -53,10 +53,11 @@ def together(tests: Sequence[Test], rng: np.random.Generator) -> Together:
     rng : numpy Generator; of bootstrap and floor
     """
     names = sorted(set.intersection(*(set(t.diagnosis.card.names) for t in tests)))
-    singles = scored_together(tests, [NONE, UNLISTED, *names], len(names))
+    unnamed = [NONE, UNLISTED] if names else [NONE]
+    singles = scored_together(tests, [*unnamed, *names], len(names))
     wanted = [*pairs(singles), *_pairs_of_all(tests)]
     tests = tuple(_with_pairs(t, wanted) for t in tests)
-    labels = [NONE, UNLISTED, *names, *dict.fromkeys(" + ".join(p) for p in wanted)]
+    labels = [*unnamed, *names, *dict.fromkeys(" + ".join(p) for p in wanted)]
     scored = scored_together(tests, labels, len(names))
     card, gate = pooled_card([t.diagnosis.card for t in tests], names), pooled_gate([t.diagnosis.gate for t in tests])
     best = scored.causes()[:TOLD]

@@ -137,7 +137,7 @@ def _carried(target: Test, sources: Sequence[Test], kind: str, label: str) -> Ca
         emulator = _reaching(target, parameters, physics)
     except ConvergenceError:
         return None
-    told = emulator.candidate(whole.names, d.observation.mask)
+    told = emulator.unloaded().candidate(whole.names, d.observation.mask)
     names = tuple(n for n in whole.names if not _carries(n, kind))
     sizes = tuple(m for n, m in zip(whole.names, whole.magnitudes, strict=True) if n in names)
 

@@ -10,7 +10,7 @@ from pipeline.gap.identifiability import Card
 from pipeline.gap.score import NONE, UNLISTED, Scored, names_of
 
 SURE = 0.8  # probability from which a cause or a class is named
-HALF = 0.5  # probability of none, or of what the library lacks, from which no cause is looked for
+HALF = 0.5  # probability of none from which no cause is looked for
 
 NONE_NEEDED, CAUSE, CLASS, ONE_OF, OUTSIDE = "none needed", "cause", "class", "one of", UNLISTED
 
@@ -49,11 +49,13 @@ def verdict(scored: Scored, card: Card, gate: Gate) -> Verdict:
             NONE_NEEDED, (), f"{told}, but these data show no effect of any plausible size" if blind else told
         )
     strange = scored.probability.get(UNLISTED, 0.0)
-    if strange >= HALF:
+    known = sum(p for label, p in scored.probability.items() if names_of(label))
+    if strange > known:
         return Verdict(
             OUTSIDE,
             (),
-            f"an effect that the library lacks explains these data better than any that it has: {strange:.2f}",
+            f"an effect that the library lacks has probability {strange:.2f}, all that it has {known:.2f} together, no "
+            f"effect {scored.probability[NONE]:.2f}",
         )
     top = scored.causes()[0]
     names = names_of(top)

@@ -158,6 +158,8 @@ def _damaged(path: Path, error: Exception) -> StoreError:
 def text_of(file: h5py.File, name: str) -> str | None:
     """The text of an attribute, of fixed or of variable length; None where there is none, StoreError where damaged."""
     value = file.attrs.get(name)
+    if not isinstance(value, str | bytes | None):
+        raise StoreError(f"{file.filename}: attribute {name} is no text: make or copy the file again")
     try:
         return value.decode() if isinstance(value, bytes) else value
     except UnicodeDecodeError as error:

@@ -104,7 +104,7 @@ def _carried(row: Mapping[str, Any]) -> str:
 
 
 def _curves(folder: Path, joint: Together) -> Figure:
-    best = joint.scored.ranked()[0]
+    best = joint.scored.first()
     draw: list[Draw] = [lambda a, t=t: _curve(a, t, best) for t in joint.tests]  # type: ignore[misc]
     columns = min(COLUMNS, len(draw))
     data = png(*draw, columns=columns, width=WIDTH * columns / COLUMNS, height=HEIGHT * -(-len(draw) // columns))

@@ -21,7 +21,7 @@ from pipeline.gap.effects import library
 from pipeline.gap.emulator import Emulator
 from pipeline.gap.fit import fit
 from pipeline.gap.learning import Remnant, learn
-from pipeline.gap.library import FORMAT, Domain, Entry, parse, written
+from pipeline.gap.library import FORMAT, HOLDS, Domain, Entry, parse, written
 from pipeline.gap.observation import Observation
 from pipeline.gap.selection import Rest, selected
 from pipeline.gap.weighing import elsewhere, scatter, weighed
@@ -40,7 +40,6 @@ from pipeline.study.engines import engine as engine_of
 FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
-REACH = (0.75, 1.5)  # of the radius, for which an entry holds
 STEP = 1e-3  # of the grid: central differences
 
 
@@ -91,7 +90,7 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
                 specimens.append(one_specimen(batch, seed, workers, entry))
             except ConvergenceError as error:
                 log.warning("the specimen of seed %d is left out: %s", seed, error)
-        domain = Domain(batch.geometry, (REACH[0] * radius, REACH[1] * radius), _last(specimens), NOISE)
+        domain = Domain(batch.geometry, (HOLDS[0] * radius, HOLDS[1] * radius), _last(specimens), NOISE)
         entry = replace(learnt(specimens, domain), seeds=(seeds[0], seeds[-1]))
     write_entry(file, entry)
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
@@ -168,8 +167,7 @@ def learnt(specimens: Sequence[Specimen], domain: Domain) -> Entry:
     for _ in range(TURNS):
         found = [rest_of(s, entry) for s in specimens]
         entry = replace(entry, discrepancy=learn([rest.remnant for rest, _ in found], 0.5))
-    radius = domain.radius[0] / REACH[0] / MM
-    coarse = {n: e.coarseness * radius for n, e in library().items() if e.coarseness}
+    coarse = {n: e.coarseness * domain.learnt_at / MM for n, e in library().items() if e.coarseness}
     chosen = selected([rest for rest, _ in found], coarse)
     off = np.log([parameters / s.truth for s, (_, parameters) in zip(specimens, found, strict=True)])
     return Entry(

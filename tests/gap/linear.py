@@ -35,15 +35,16 @@ def data(target: np.ndarray, sigma: np.ndarray) -> Data:
 
 def exact_log_bayes(target: np.ndarray, sigma: np.ndarray, base: np.ndarray, column: np.ndarray, scale: float) -> float:
     """Against none: both Gaussian after the flat parameters are integrated out (restricted likelihood)."""
-    return _restricted(target, sigma + scale**2 * np.outer(column, column), base) - _restricted(target, sigma, base)
+    return restricted(target, sigma + scale**2 * np.outer(column, column), base) - restricted(target, sigma, base)
 
 
 def factor_log_bayes(target: np.ndarray, sigma: np.ndarray, base: np.ndarray, more: np.ndarray) -> float:
     """Of a further covariance, against none; the same way."""
-    return _restricted(target, sigma + more, base) - _restricted(target, sigma, base)
+    return restricted(target, sigma + more, base) - restricted(target, sigma, base)
 
 
-def _restricted(y: np.ndarray, cov: np.ndarray, base: np.ndarray) -> float:
+def restricted(y: np.ndarray, cov: np.ndarray, base: np.ndarray) -> float:
+    """Log density of what is left when the flat parameters are integrated out, but for a constant."""
     inverse = np.linalg.inv(cov)
     normal = base.T @ inverse @ base
     project = inverse - inverse @ base @ np.linalg.solve(normal, base.T @ inverse)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.effect import Magnitude
@@ -11,7 +14,7 @@ from pipeline.gap.fit import Data, fit
 from pipeline.gap.metric import Metric
 from pipeline.gap.noise import noise_bic
 from pipeline.gap.observation import Observation, Reading, Sight
-from tests.gap.linear import BOX, WIDE, candidate, covariance, data, exact_log_bayes, none
+from tests.gap.linear import BOX, WIDE, candidate, covariance, data, exact_log_bayes, none, restricted
 
 
 def scene(seed: int, size: float = 1.0):
@@ -76,6 +79,21 @@ def test_two_effects_at_once_have_the_exact_evidence():
     with_first = sigma + WIDE.scale**2 * np.outer(column, column)
     exact = first + exact_log_bayes(target, with_first, base, other, WIDE.scale)
     assert found == pytest.approx(exact, abs=0.02)  # midpoints 0.7 standard deviations apart
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+def test_an_effect_that_is_doubted_has_the_exact_evidence(size):
+    """What is uncertain in proportion to the value widens the covariance at every value, along the parameters too."""
+    base, column, sigma, target = scene(6, 1.0)
+    doubt = size * (np.random.default_rng(3).normal(size=column.size) + base[:, 0])
+    unsure = replace(candidate(base, "x", column), doubt=lambda a: np.outer(doubt, a))
+    given = data(target, sigma)
+    found = fit(unsure, given).log_evidence - fit(none(base), given).log_evidence
+    line = np.linspace(-8, 8, 801) * WIDE.scale
+    terms = [restricted(target - a * column, sigma + a**2 * np.outer(doubt, doubt), base) for a in line]
+    prior = -0.5 * (line / WIDE.scale) ** 2 - np.log(WIDE.scale * np.sqrt(2 * np.pi))
+    exact = logsumexp(terms + prior) + np.log(line[1] - line[0]) - restricted(target, sigma, base)
+    assert found == pytest.approx(exact, abs=0.05)  # the nodes of a quadrature
 
 
 def test_an_effect_that_data_do_not_see_keeps_its_prior():

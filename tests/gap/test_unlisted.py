@@ -65,6 +65,7 @@ def test_its_evidence_is_that_of_a_gaussian_process():
     test = odd(5e-6)
     emulator = found(test).emulator
     seen, data = weighed(test, emulator, entry())
+    assert weighed(test, emulator, heavy())[1].metric.log_volume == pytest.approx(data.metric.log_volume)
     none = fit(emulator.candidate([], seen.mask), data)
     known = {n: emulator.candidate([n], seen.mask) for n in SOME}
     target = data.target - none.candidate.predict(none.parameters, np.zeros(0))
@@ -78,6 +79,30 @@ def test_its_evidence_is_that_of_a_gaussian_process():
     ]
     ours = unlisted(seen, data, none, known).log_evidence - none.log_evidence
     assert ours == pytest.approx(logsumexp(exact) - np.log(len(exact)), abs=0.2)  # what is not linear in the parameters
+
+
+def test_where_scales_are_unknown_it_is_a_mixture_over_them():
+    """Of a wave as small as nothing the evidence is that of none; of a real one a mean over scales of Σ."""
+    test = odd(5e-6)
+    emulator = found(test).emulator
+    seen, data = weighed(test, emulator, heavy())
+    none = fit(emulator.candidate([], seen.mask), data)
+    known = {n: emulator.candidate([n], seen.mask) for n in SOME}
+    tiny = {
+        n: replace(c, magnitudes=(replace(c.magnitudes[0], scale=1e-6 * c.magnitudes[0].scale),))
+        for n, c in known.items()
+    }
+    assert unlisted(seen, data, none, tiny).log_evidence == pytest.approx(none.log_evidence, abs=1e-3)
+    sure = weighed(test, emulator, entry())[1]
+    plain = fit(emulator.candidate([], seen.mask), sure)
+    gains = [unlisted(seen, d, n, known).log_evidence - n.log_evidence for d, n in ((data, none), (sure, plain))]
+    assert gains[0] < gains[1]  # a test may also just differ more than most
+
+
+def heavy():
+    """The scene's entry, of which the scale of the modes is unknown."""
+    one = entry()
+    return replace(one, discrepancy=replace(one.discrepancy, tail=6.0))
 
 
 def _slopes(none, data) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -43,6 +44,9 @@ def test_none_has_half_the_prior_and_a_pair_the_product_of_odds():
     for n in (1, 5, 20):
         assert (1 + inclusion(n)) ** -n == pytest.approx(0.5)
     odds = inclusion(2)
+    with_unlisted = from_bayes({NONE: 0.0, "a": 0.0, UNLISTED: 0.0}, 1)
+    assert with_unlisted.probability["a"] == pytest.approx(with_unlisted.probability[UNLISTED])
+    assert with_unlisted.probability[NONE] == pytest.approx(0.5 / (0.5 + 2 * 0.5 * inclusion(2)))  # no pair scored
     flat = from_bayes({NONE: 0.0, "a": 0.0, "b": 0.0, "a + b": 0.0}, 2)
     assert flat.probability[NONE] == pytest.approx(0.5)
     assert flat.probability["a + b"] == pytest.approx(odds**2 * 0.5)
@@ -119,6 +123,20 @@ def test_two_effects_that_do_the_same_are_a_class_and_others_are_not():
     assert card(twice, data, np.zeros(2)).classes == (("a", "b"),)
 
 
+def test_what_is_doubted_in_a_competitor_is_no_difference():
+    """b is known to a tenth of its norm along c: a, which is b with that in it, is told from b by no more than that."""
+    base, columns = library()
+    data = Data(np.zeros(len(base)), Metric(np.eye(len(base))), BOX)
+    one, other = columns[:, 0], columns[:, 1]
+    b = replace(candidate(base, "b", 2 * one, SIZE), doubt=lambda a: np.outer(other, a))
+    some = {"a": candidate(base, "a", 2 * one + other, SIZE), "b": b}
+    found = card(some, data, np.zeros(2))
+    assert found.remaining.max() < 1.1  # one standard deviation
+    assert found.classes == (("a", "b"),)
+    sure = card({**some, "b": candidate(base, "b", 2 * one, SIZE)}, data, np.zeros(2))
+    assert sure.classes == ()
+
+
 def test_an_effect_that_would_have_to_be_implausible_is_no_mate():
     base, columns = library()
     data = Data(np.zeros(len(base)), Metric(np.eye(len(base))), BOX)
@@ -168,11 +186,20 @@ def test_verdicts(bayes, classes, gate, kind, named):
 def test_what_the_library_lacks_is_weighed_like_an_effect_and_is_a_verdict():
     for strange, kind in ((0.5, NONE_NEEDED), (30.0, OUTSIDE), (20.5, ONE_OF)):
         scored = from_bayes({NONE: 0.0, UNLISTED: strange, "effect 0": 0.0 if strange < 20 else 21.0}, 3)
-        assert scored.probability[UNLISTED] / scored.probability[NONE] == pytest.approx(np.exp(strange) * inclusion(3))
+        assert scored.probability[UNLISTED] / scored.probability[NONE] == pytest.approx(np.exp(strange) * inclusion(4))
         found = verdict(scored, cards(), OPEN)
         assert found.kind == kind, strange
     assert found.named == ("effect 0",)
     assert "an effect that the library lacks" in found.reason
+
+
+def test_what_the_library_lacks_names_nothing_where_it_comes_before_all_causes():
+    """None 0.47, outside 0.46, each of eighteen effects 0.004: to name two of these would be to name bystanders."""
+    log_bayes = {NONE: 0.0, UNLISTED: 3.3, **dict.fromkeys(names(18), -1.5)}
+    scored = from_bayes(log_bayes, 18)
+    assert max(scored.probability.values()) < 0.5
+    found = verdict(scored, cards(), OPEN)
+    assert (found.kind, found.named) == (OUTSIDE, ())
 
 
 def test_data_that_show_nothing_are_not_praised():

@@ -54,6 +54,7 @@ GOALS = (
     Goal("coverage_90", "90 % set holds the truth", low=0.85, high=0.95),
     Goal("set_size", "mean size of the 90 % set", high=6),
     Goal("false_alarm", "false alarms on effect-free tests", high=0.10),
+    Goal("free_called_outside", "effect-free tests called outside the library"),
     Goal("ece", "expected calibration error", high=0.10),
     Goal("outside_recall_at_5_limits", "effects outside the library flagged, at 5 detection limits or more", low=0.70),
     Goal("closure_over_oracle", "closure over that of the true effect (median, d′ ≥ 5)", low=0.85),

@@ -11,8 +11,9 @@ import numpy as np
 from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED
 from pipeline.gap.score import NONE, UNLISTED
+from pipeline.gap.verdict import OUTSIDE
 
-SURE, VISIBLE, OUTSIDE = 0.8, 5.0, "outside the library"
+SURE, VISIBLE = 0.8, 5.0
 Z = 1.959964  # of 95 %
 BINS = 10
 STEPS = (0.5, 1.0, 2.0, 4.0)  # detection limits between which cases are counted together
@@ -174,6 +175,11 @@ def named_surely(case: Scored) -> bool:
     return case.result.get("verdict") in ("cause", "class") and bool(case.result.get("named")) and _sure(case) >= SURE
 
 
+def called_outside(case: Scored) -> bool:
+    """The verdict is that the library does not explain the test."""
+    return bool(case.result.get("verdict") == OUTSIDE)
+
+
 def _sure(case: Scored) -> float:
     """Probability of what is named: of a class, all its members together."""
     named = set(case.result.get("named", []))
@@ -283,6 +289,7 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
         "cases": len(every),
         "failed": sum(not c.result for c in every),
         "false_alarm": share(free, named_surely),
+        "free_called_outside": share(free, called_outside),
         "top1": share(single, lambda c: c.right),
         "class_top1": share(single, lambda c: c.right_class),
         "measurement_top1_at_2_limits": share(clear, lambda c: c.right),
@@ -291,8 +298,8 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
         "set_size": {"value": _mean(sizes), "interval_95": _bootstrap(sizes), "cases": len(sizes)},
         "ece": {"value": ece, "interval_95": _ece_interval(inside), "cases": len(inside)},
         "reliability": bins,
-        "outside_recall": share(outside, lambda c: c.top == UNLISTED),
-        "outside_recall_at_5_limits": share(clear_outside, lambda c: c.top == UNLISTED),
+        "outside_recall": share(outside, called_outside),
+        "outside_recall_at_5_limits": share(clear_outside, called_outside),
         "confident_wrong_outside": share(outside, named_surely),
         "pairs_top1": share(pairs, lambda c: c.right),
         "pairs_one_named": share(pairs, lambda c: bool(set(c.top.split(" + ")) & set(c.truth.split(" + ")))),
