@@ -7,11 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.core.errors import InputError
+from pipeline.core.errors import ConvergenceError, InputError
+from pipeline.execution.progress import Silent
 from pipeline.gap.effects import library
 from pipeline.study.blind_check import cases as drawing
 from pipeline.study.blind_check.limits import library_digest, limits_of
 from pipeline.study.blind_check.looks import Look, strips
+from pipeline.study.blind_check.make import _broken_all, kept
 from pipeline.study.blind_check.recording import taken
 from pipeline.study.blind_check.seal import digest
 
@@ -114,3 +116,36 @@ def test_frames_are_closer_where_the_load_rises_and_falls():
     assert (np.diff(times) > 0).all()
     assert times[-1] - times[3] == pytest.approx(60.0)  # the first four at rest
     assert np.count_nonzero(times[4:] - times[3] <= 18.0 + 1e-9) == 24
+
+
+def test_a_set_with_one_member_left_is_a_test_like_any_other():
+    found = drawing.drawn_cases("full", LIMITS.value, np.random.default_rng(1))
+    one, two = sorted({c.replicates for c in found} - {""})[:2]
+    short = [c for c in found if c.replicates != one] + [c for c in found if c.replicates == one][:1]
+    left = kept(short)
+    assert [c.name for c in left] == [c.name for c in short]
+    assert one not in {c.replicates for c in left}
+    assert sum(c.replicates == two for c in left) == 4
+
+
+class Breaking:
+    """Stands for a job of which some tests cannot be broken."""
+
+    def __init__(self, count: int, brittle: set[str]):
+        self.names, self.brittle = [f"case-{k}" for k in range(count)], brittle
+
+    def cases(self) -> list[str]:
+        return self.names
+
+    def write(self, names) -> list[str]:
+        if self.brittle & set(names):
+            raise ConvergenceError("the test snaps back")
+        return list(names)
+
+
+def test_few_tests_that_cannot_be_broken_are_left_out_and_said():
+    job = Breaking(20, {"case-3"})
+    groups = [job.names[k : k + 2] for k in range(0, 20, 2)]
+    assert _broken_all(job, groups, 1, Silent()) == dict.fromkeys(("case-2", "case-3"), "the test snaps back")
+    with pytest.raises(ConvergenceError, match="4 tests cannot be broken, more than 10%; take another seed"):
+        _broken_all(Breaking(20, {"case-3", "case-9"}), groups, 1, Silent())

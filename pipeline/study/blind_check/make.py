@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from pipeline.study.blind_check.seal import BUNDLES, PLAN, SEAL, canonical, lock
 from pipeline.study.blind_check.specimens import Drawn, crack, draw
 
 BEGUN = "begun.json"  # in the vault
+LOST = 0.1  # share of the tests that may turn out not to be breakable
 
 
 def make(
@@ -65,15 +67,19 @@ def make(
     progress.stage(f"breaking {len(cases)} tests")
     ready = [c.name for c in cases if _ready(out, c)]
     progress.begin(len(cases), len(ready), "test")
-    _broken_all(job, [names for names in _groups(cases) if not set(names) <= set(ready)], workers, progress)
+    lost = _broken_all(job, [names for names in _groups(cases) if not set(names) <= set(ready)], workers, progress)
+    cases = kept([c for c in cases if c.name not in lost])
     specimens = job.specimens()
     rows = {case.name: truth_row(case, specimens[case.specimen], known.value) for case in cases}
     truth = salted({"format": 1, "size": size, "seed": seed, "version": __version__, "cases": rows})
     (out / PLAN).write_bytes(canonical({c.name: planned(c) for c in cases}))
     lock(truth, vault)
     made = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    write_seal(out, truth, vault, {"size": size, "made": made, "detection_limits": known.told()})
+    write_seal(out, truth, vault, {"size": size, "made": made, "left_out": lost, "detection_limits": known.told()})
     told = f"{len(cases)} sealed tests; their truth lies locked in {vault.name}"
+    told += (
+        f"; {len(lost)} more were drawn that cannot be broken: {'; '.join(sorted(set(lost.values())))}" if lost else ""
+    )
     stale = known.source.get("by_library_in_use") is False
     return told + ("; the detection limits are of another library: see scripts/blind_limits.py" if stale else "")
 
@@ -111,6 +117,12 @@ class Job:
         return [case.name for case in wanted]
 
 
+def kept(cases: Sequence[Case]) -> list[Case]:
+    """The cases; of a set of replicates that has one member left this is a test like any other."""
+    members = Counter(c.replicates for c in cases)
+    return [replace(c, replicates="") if c.replicates and members[c.replicates] == 1 else c for c in cases]
+
+
 def _ready(out: Path, case: Case) -> bool:
     return (out / BUNDLES / case.name / "experiment.toml").exists()
 
@@ -123,29 +135,36 @@ def _groups(cases: Sequence[Case]) -> list[list[str]]:
     return list(found.values())
 
 
-def _broken_all(job: Job, groups: Sequence[Sequence[str]], workers: int, progress: Progress) -> None:
+def _broken_all(job: Job, groups: Sequence[Sequence[str]], workers: int, progress: Progress) -> dict[str, str]:
     """Break all specimens; each in a process of its own where there are several workers.
+
+    Returns
+    -------
+    case → why it cannot be broken on any mesh
 
     Raises
     ------
     ConvergenceError
-        at the end, where one cannot be broken on any mesh; what could be is kept
+        at the end, where these are more than `LOST`; what could be broken is kept
     """
-    failures: list[ConvergenceError] = []
+    lost: dict[str, str] = {}
     own = Here() if workers == 1 else LocalProcesses(workers)
     try:
-        under_way = [own.submit(job.write, names) for names in groups]
+        under_way = {own.submit(job.write, names): names for names in groups}
         for future in as_completed(under_way):
             if isinstance(error := future.exception(), ConvergenceError):
-                failures.append(error)
+                lost |= dict.fromkeys(under_way[future], str(error))
                 continue
             for name in future.result():
                 progress.done(name)
     finally:
         if isinstance(own, LocalProcesses):
             own.kill()
-    if failures:
-        raise ConvergenceError(f"{len(failures)} specimens cannot be broken, take another seed: {failures[0]}")
+    if len(lost) > LOST * len(job.cases()):
+        raise ConvergenceError(
+            f"{len(lost)} tests cannot be broken, more than {LOST:.0%}; take another seed: {next(iter(lost.values()))}"
+        )
+    return lost
 
 
 def _begun(vault: Path, asked: dict[str, Any]) -> None:
