@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,9 @@ import numpy as np
 from pipeline.core.errors import InputError
 from pipeline.gap.calibration import Answer, Calibration, calibrated, expected_error
 from pipeline.gap.effects import effect
+from pipeline.gap.library import parse
 from pipeline.study.batch import Batch
-from pipeline.study.gap_library import write_entry
+from pipeline.study.gap_library import same, write_entry
 from pipeline.study.gap_trials import Bench, Trial, unseen
 
 SIZES = (0.15, 1.0)  # of the plausible maximum, log-uniform
@@ -41,7 +43,9 @@ def calibrate(batch: Batch, file: Path, seeds: Sequence[int], effects: int = 6) 
     if len({a.group for a in answers}) < 2:
         raise InputError("a temperature needs trials of at least two specimens")
     found = calibrated(answers)
-    write_entry(file, replace(benches[0].entry, temperature=found.temperature, tests=found.tests))
+    used = benches[0].entry.domain
+    learnt = next(e for e in parse(json.loads(file.read_text("utf-8"))) if same(e.domain, used))
+    write_entry(file, replace(learnt, temperature=found.temperature, tests=found.tests))
     return told(found, answers)
 
 

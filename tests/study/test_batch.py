@@ -27,11 +27,19 @@ def test_a_test_is_made_once_with_what_was_asked_for(tmp_path, monkeypatch):
     for _ in range(2):
         Batch(tmp_path, "dct", 1.5).make(tmp_path / "test", 7, {"modulus": 0.1, "creep": 1.0})
     effect = [("creep", 1.0), ("modulus", 0.1)]
-    assert made == [{"seed": 7, "geometry": "dct", "radius_mm": 1.5, "effect": effect}]
+    asked = {"seed": 7, "geometry": "dct", "radius_mm": 1.5}
+    assert made == [{**asked, "creep": None, "effect": effect}]
+    sheet = tmp_path / "creep.csv"
+    Batch(tmp_path, "dct", 1.5, creep=sheet).make(tmp_path / "still", 7, {"modulus": 0.1})
+    assert made[1:] == [{**asked, "creep": sheet, "effect": [("creep", 0.0), ("modulus", 0.1)]}]  # that nothing creeps
 
 
 def test_the_entry_is_of_the_geometry_and_radius(tmp_path):
     [one, *_] = shipped()
-    assert Batch(tmp_path, one.domain.geometry, 1e3 * one.domain.radius[0]).entry([one]) is one
+    fine = Batch(tmp_path, one.domain.geometry, 1e3 * one.domain.radius[0]).entry([one])
+    assert fine.domain == one.domain
+    at = one.domain.radius[0] / one.domain.learnt_at
+    assert fine.apparent["notch_length_mm"] == pytest.approx(at * one.apparent["notch_length_mm"])  # of finer particles
+    assert fine.apparent["interface_ratio"] == one.apparent["interface_ratio"]
     with pytest.raises(ValueError, match="is empty"):
         Batch(tmp_path).entry([])
