@@ -23,19 +23,17 @@ class Candidate:
     magnitudes : tuple of Magnitude, one an effect
     predict : Predict; with zero amplitudes the model as it is
     doubt : amplitudes (k,) → (n, j) array B of the data: the prediction is uncertain by B Bᵀ there
-    title : str; how results call it, by its names where not given
     """
 
     names: tuple[str, ...]
     magnitudes: tuple[Magnitude, ...]
     predict: Predict
     doubt: Callable[[np.ndarray], np.ndarray] | None = None
-    title: str = ""
 
     @property
     def label(self) -> str:
         """As results call it."""
-        return self.title or " + ".join(self.names) or "none"
+        return " + ".join(self.names) or "none"
 
     @property
     def components(self) -> tuple[Magnitude, ...]:

@@ -223,7 +223,7 @@ def baseline(
         values = np.reshape([o.flat() for o in outcomes], (*design.shape, -1))
         emulator = Emulator(observation.sight, abscissae, design.f_max, design.delta_max, values, clear=clear)
         look = _Look(*weighed(observation, emulator, entry), measuring, entry.temperature)
-        fits, scored = look.judge(emulator, with_pairs=False)
+        fits, scored = look.judge(emulator, whole=False)
         best = fits[scored.first()]
         steps = [int(x > high) - int(x < low) for x, (low, high) in zip(best.parameters, emulator.inner, strict=True)]
         moved = design.moved(*steps)
@@ -305,15 +305,15 @@ class _Look:
     names: list[str]
     temperature: float
 
-    def judge(self, emulator: Emulator, with_pairs: bool = True) -> tuple[dict[str, Fitted], Scored]:
-        """Fit none, every effect, one that the library lacks, and the pairs of the best; score them."""
+    def judge(self, emulator: Emulator, whole: bool = True) -> tuple[dict[str, Fitted], Scored]:
+        """Fit none and every effect; on the whole also one that the library lacks and pairs of the best; score them."""
         fits = {NONE: self._fit(emulator, ())}
         for name in self.names:
             fits[name] = self._fit(emulator, (name,))
-        if self.names:
+        if whole and self.names:
             known = {name: fits[name].candidate for name in self.names}
             fits[UNLISTED] = unlisted(self.observation, self.data, fits[NONE], known)
-        for pair in pairs(self._score(fits)) if with_pairs else ():
+        for pair in pairs(self._score(fits)) if whole else ():
             found = self._fit(emulator, pair)
             fits[found.candidate.label] = found
         return fits, self._score(fits)
@@ -362,9 +362,9 @@ def closures(
     best = fits[NONE]
     none = held_out(best.candidate, data, within + across, best.parameters)
     complete = left_by_complete(best.candidate, data, within, best.parameters, rng)
-    found = {}
+    found, untold = {}, emulator.unloaded()
     for label in scored.causes()[:closed]:
-        candidate = emulator.unloaded().candidate(fits[label].candidate.names, observation.mask)
+        candidate = untold.candidate(fits[label].candidate.names, observation.mask)
         other = held_out(candidate, data, within + across, fits[label].parameters)
         found[label] = closure(observation, data, none, other, complete, rng.spawn(1)[0])
     return found

@@ -46,7 +46,7 @@ class Signature:
         """Change (n,) for a value of one, of the straight line nearest to the two."""
         return np.asarray(self.values @ self.changes / (self.values @ self.values))
 
-    def off(self, value: float) -> np.ndarray:
+    def doubt(self, value: float) -> np.ndarray:
         """How far (n,) the change by another value may be off: as far, in proportion, as two are from the line.
 
         Two values cannot tell a curve from a crack that goes another way in one of the simulations.
@@ -265,7 +265,7 @@ class Emulator:
         """By what the changes by the physics effects among some are uncertain; (j, 2sp + s)."""
         _, physics = self._sorted(names, amplitudes)
         signatures = self._read[1]
-        rows = [signatures[name].off(value) for name, value in physics.items()]
+        rows = [signatures[name].doubt(value) for name, value in physics.items()]
         return np.reshape(rows, (len(rows), 2 * self.sight.cmod.size * len(self.sight.points) + self.sight.cmod.size))
 
     def unloaded(self) -> Emulator:

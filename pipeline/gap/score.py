@@ -67,8 +67,6 @@ def order_of(label: str) -> int:
 def inclusion(effects: int) -> float:
     """Prior odds of one effect where each of so many is there or not by itself, and none with `P_NONE`.
 
-    What the library lacks counts as one more of them.
-
     (1 + odds)^−effects = P_NONE; a pair then has the odds of its members multiplied.
     """
     return float(P_NONE ** (-1 / max(effects, 1)) - 1)
@@ -89,7 +87,7 @@ def score(log_evidence: Mapping[str, float], effects: int, temperature: float = 
 
 
 def from_bayes(log_bayes: Mapping[str, float], effects: int, temperature: float = 1.0) -> Scored:
-    """Probabilities from log Bayes factors; arguments as of `score`."""
+    """Probabilities from log Bayes factors; arguments as of `score`. What the library lacks is one effect more."""
     odds = np.log(inclusion(effects + (UNLISTED in log_bayes)))
     weight = np.array([log_bayes[label] / temperature + order_of(label) * odds for label in log_bayes])
     share = np.exp(weight - weight.max())

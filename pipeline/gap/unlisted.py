@@ -14,7 +14,6 @@ from pipeline.gap.fit import Data, Fitted, fit
 from pipeline.gap.metric import Metric
 from pipeline.gap.modes import MODES, amplitudes, shapes
 from pipeline.gap.observation import Observation
-from pipeline.gap.score import UNLISTED
 
 SIZES = (0.1, 0.25, 0.5, 1.0, 2.0)  # of what an effect of the library does at its prior's scale; equally probable
 LENGTHS = (0.3, 1.0)  # of the CMOD that is looked at, over which its waves reach; equally probable
@@ -43,17 +42,12 @@ def unlisted(observation: Observation, data: Data, none: Fitted, known: Mapping[
     own = sizes(observation, none, known)
     alike = np.vstack([np.broadcast_to(np.sqrt(np.mean(own[:-1] ** 2, axis=0)), own[:-1].shape), own[-1:]])
     for wide, length, size in product((own, alike), LENGTHS, SIZES):
-        wave = size**2 * waves(observation, wide, length)
-        metric = Metric(data.metric.covariance + wave, data.metric.uncertain, data.metric.tail)
+        covariance = data.metric.covariance + size**2 * waves(observation, wide, length)
+        metric = Metric(covariance, data.metric.uncertain, data.metric.tail)
         one = fit(none.candidate, replace(data, metric=metric), none.parameters)
-        found.append((one, wave, one.log_evidence - 0.5 * (metric.log_volume - data.metric.log_volume)))
-    best, wave, _ = max(found, key=lambda one: one[2])
-    strength, along = np.linalg.eigh(wave)
-    kept = strength > 1e-12 * strength[-1]
-    doubt = along[:, kept] * np.sqrt(strength[kept])
-    candidate = replace(none.candidate, doubt=lambda _: doubt, title=UNLISTED)
-    evidence = float(logsumexp([value for *_, value in found]) - np.log(len(found)))
-    return replace(best, candidate=candidate, log_evidence=evidence)
+        found.append((one, one.log_evidence - 0.5 * (metric.log_volume - data.metric.log_volume)))
+    best, _ = max(found, key=lambda one: one[1])
+    return replace(best, log_evidence=float(logsumexp([value for _, value in found]) - np.log(len(found))))
 
 
 def waves(observation: Observation, size: np.ndarray, length: float) -> np.ndarray:

@@ -16,6 +16,9 @@ from pipeline.store.atomic import written_aside
 Shape = tuple[str | int, ...]
 
 
+LONGEST = 60_000  # bytes of text in an attribute: HDF5 keeps attributes in headers of 64 kB
+
+
 @dataclass(frozen=True)
 class Entry:
     """One row of a layout.
@@ -167,6 +170,8 @@ def text_of(file: h5py.File, name: str) -> str | None:
 
 
 def _put(file: h5py.File, entry: Entry, value: Any) -> None:
+    if entry.shape is None and entry.dtype == "str" and len(str(value).encode()) > LONGEST:
+        raise StoreError(f"{entry.name} has more than {LONGEST} bytes of text: an attribute of HDF5 holds no more")
     if entry.shape is None:
         file.attrs[entry.name] = _encoded(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
         return

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipeline.core.units import MM
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.library import Entry, nearest
+from pipeline.store.atomic import write_atomically
+from pipeline.store.creep import FILE, encode_creep
+from pipeline.store.new import first_experiment
+from pipeline.store.results import prepare_output
+from pipeline.study.typical_creep import creep_record
 from pipeline.study.virtual_test import virtual_test
 
 
@@ -38,6 +43,12 @@ class Batch:
     def entry(self, entries: list[Entry]) -> Entry:
         """The entry of a library to judge the specimens by."""
         return nearest(entries, self.geometry, self.radius_mm * MM)
+
+    def with_creep(self) -> Batch:
+        """The same with a creep test of the mastic, of the modulus that virtual tests have."""
+        sheet = prepare_output(self.out) / FILE
+        write_atomically(sheet, encode_creep(creep_record(first_experiment(self.geometry, "batch"))))
+        return replace(self, creep=sheet)
 
     def make(self, bundle: Path, seed: int, effects: Mapping[str, float] | None = None) -> None:
         """Make a virtual test with effects, if it was not made before."""

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.core.units import GPA
 from pipeline.gap.effects import effect, library
 from pipeline.gap.library import Entry
 from pipeline.gap.score import NONE, UNLISTED, names_of
 from pipeline.gap.verdict import CAUSE, CLASS, NONE_NEEDED, OUTSIDE, SURE
-from pipeline.store.atomic import write_atomically
-from pipeline.store.creep import FILE, encode_creep
 from pipeline.study.batch import Batch
 from pipeline.study.gap_calibration import answer, sized
 from pipeline.study.gap_trials import Bench, Trial, unseen
-from pipeline.study.typical_creep import burgers_record
 
 TIMES = (2.0, 4.0)  # detection limits
-MASTIC = 10 * GPA  # of virtual tests: with a creep test it says how stiff the mastic is at first
 HEAD = ("put in", "times limit", "seed", "verdict", "named", "P of it", "estimate, 95 %", "closure, 95 %")
 
 
@@ -46,9 +40,7 @@ def confusion(
     times : detection limits, at most the plausible maximum
     removed : whether every effect is also diagnosed by a library that lacks it
     """
-    sheet = batch.out / FILE
-    write_atomically(sheet, encode_creep(burgers_record(MASTIC)))
-    benches = unseen(replace(batch, creep=sheet), file, [*seeds, *free])
+    benches = unseen(batch.with_creep(), file, [*seeds, *free])
     trials: list[Trial] = []
     for bench in benches:
         batch.progress.stage(f"seed {bench.seed}, nothing")

@@ -15,10 +15,6 @@ AT = np.geomspace(0.1, 300.0, 40)  # s
 def creep_record(experiment: Experiment) -> CreepRecord:
     """Compliance of a Burgers body whose instant stiffness is the mastic's."""
     assert experiment.material.mastic_modulus_gpa is not None
-    return burgers_record(experiment.material.mastic_modulus_gpa * GPA)
-
-
-def burgers_record(modulus: float) -> CreepRecord:
-    """The same for an instant stiffness in Pa."""
+    d1 = 1 / (experiment.material.mastic_modulus_gpa * GPA)
     growth = AT / FLOW + SHARE * -np.expm1(-AT / TIME)
-    return CreepRecord(AT, (1 + growth) / modulus)
+    return CreepRecord(AT, d1 * (1 + growth))

@@ -221,15 +221,15 @@ def test_what_does_not_grow_in_proportion_to_an_effect_is_doubted():
     """A straight signature is believed; of one that is alike for both signs, as when a crack turns off, nothing."""
     values, line = np.array([-0.3, 0.6]), np.array([1.0, -2.0])
     straight = Signature(values, np.outer(values, line))
-    assert np.allclose(straight.off(0.25), 0.0)
+    assert np.allclose(straight.doubt(0.25), 0.0)
     assert np.allclose(straight.at(0.25), 0.25 * line)
     even = Signature(np.array([-0.3, 0.3]), np.array([line, line]))
-    assert np.allclose(np.abs(even.off(0.3)), np.abs(line))
-    assert np.allclose(even.off(0.15), even.off(0.3) / 2)  # in proportion: of a small one as little is known
+    assert np.allclose(np.abs(even.doubt(0.3)), np.abs(line))
+    assert np.allclose(even.doubt(0.15), even.doubt(0.3) / 2)  # in proportion: of a small one as little is known
     mixed = Signature(np.array([-0.3, 0.3]), np.array([0.0 * line, line]))
-    assert np.allclose(np.abs(mixed.off(0.3)), np.abs(line) / 2)
+    assert np.allclose(np.abs(mixed.doubt(0.3)), np.abs(line) / 2)
     onward = Signature(np.array([0.35, 0.75]), np.array([line, line]))  # a crack that turns off at once
-    assert all(np.abs(onward.off(value)).max() > 0.2 * value for value in np.linspace(0.05, 1.0, 20))  # never sure
+    assert all(np.abs(onward.doubt(value)).max() > 0.2 * value for value in np.linspace(0.05, 1.0, 20))  # never sure
 
 
 def test_an_effect_is_seen_less_where_it_is_doubted():

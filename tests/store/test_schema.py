@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pipeline.core.errors import MissingFileError, StoreError
 from pipeline.store import layouts
-from pipeline.store.schema import Entry, Layout
+from pipeline.store.schema import LONGEST, Entry, Layout
 
 LAYOUT = Layout(
     "example",
@@ -140,6 +140,12 @@ def test_texts_are_kept_with_a_fixed_length(path):
     with h5py.File(path) as file:
         assert h5py.check_string_dtype(file.attrs.get_id("note").dtype).length == len("Größe".encode())
     assert LAYOUT.decode(path)["note"] == "Größe"
+
+
+def test_a_text_that_no_attribute_holds_is_refused():
+    with pytest.raises(StoreError, match="note has more than 60000 bytes"):
+        LAYOUT.encode({**values(), "note": "x" * 70_000})
+    assert LAYOUT.encode({**values(), "note": "x" * LONGEST})
 
 
 def test_texts_of_variable_length_are_read(path):

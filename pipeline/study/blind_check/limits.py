@@ -23,14 +23,12 @@ from pipeline.gap.effects import effect, library
 from pipeline.gap.identifiability import DETECTED, Card
 from pipeline.gap.library import FILE as LIBRARY
 from pipeline.gap.library import shipped
-from pipeline.store import creep
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import read_bundle
 from pipeline.store.results import plain
 from pipeline.store.start import start_parameters
 from pipeline.study.batch import Batch
 from pipeline.study.diagnose_case import ENGINE, prepared
-from pipeline.study.typical_creep import creep_record
 
 FILE, FORMAT = "limits.json", 1
 FIRST_SEED = 9400  # of the specimens: neither the library's nor of its trials
@@ -120,7 +118,7 @@ def make_limits(batch: Batch, file: Path, seeds: Sequence[int]) -> str:
     file : written; an entry of the same geometry and radius is replaced, others stay
     seeds : of the specimens
     """
-    cards = []
+    cards, batch = [], batch.with_creep()  # as in the sealed bundles
     for seed in seeds:
         batch.progress.stage(f"effect-free test of seed {seed}")
         try:
@@ -150,8 +148,6 @@ def card_of(batch: Batch, seed: int) -> Card:
     folder = batch.folder(seed)
     bundle = folder / "test"
     batch.make(bundle, seed)
-    if not (bundle / creep.FILE).exists():  # as in the sealed bundles
-        write_atomically(bundle / creep.FILE, creep.encode_creep(creep_record(read_bundle(bundle).experiment)))
     settings = RunSettings(workers=1)
     case = prepared(read_bundle(bundle), folder / "diagnosis", ENGINE, settings, Silent(), Here())
     rng = np.random.default_rng(seed)

@@ -77,9 +77,8 @@ def make(
     made = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     write_seal(out, truth, vault, {"size": size, "made": made, "left_out": lost, "detection_limits": known.told()})
     told = f"{len(cases)} sealed tests; their truth lies locked in {vault.name}"
-    told += (
-        f"; {len(lost)} more were drawn that cannot be broken: {'; '.join(sorted(set(lost.values())))}" if lost else ""
-    )
+    if lost:
+        told += f"; {len(lost)} more were drawn that cannot be broken: {'; '.join(sorted(set(lost.values())))}"
     stale = known.source.get("by_library_in_use") is False
     return told + ("; the detection limits are of another library: see scripts/blind_limits.py" if stale else "")
 

@@ -17,8 +17,8 @@ from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
 from pipeline.store.experiment import Experiment
-from pipeline.study import typical_creep as creep
 from pipeline.study.blind_check.cases import STRANGERS, Case, Size
+from pipeline.study.typical_creep import FLOW, SHARE, TIME
 from pipeline.study.virtual_test import Request, prepare
 
 SPREAD = 0.12  # the truth lies within ± this share of the start
@@ -124,5 +124,5 @@ def material_of(drawn: Drawn) -> Material:
         interface_opening=m.interface_opening_ratio,
         touching_is_stone=m.touching == "aggregate",
         shear=SLIDING * m.shear_strength_ratio,
-        creep=(d1, creep.SHARE * d1, creep.FLOW / d1, creep.TIME),
+        creep=(d1, SHARE * d1, FLOW / d1, TIME),
     )
