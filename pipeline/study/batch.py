@@ -1,9 +1,14 @@
-"""A batch of specimens of engine B, of one geometry and radius, on which the diagnosis learns or is tried."""
+"""A batch of specimens of engine B, of one geometry and radius, on which the diagnosis learns or is tried.
+
+No two materials are put together alike, and two models of one kind differ less than a model and a material. So the
+networks of a batch are of several kinds: finer and coarser than the lattice, with bonds that carry shear and without.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 from pipeline.core.units import MM
@@ -15,6 +20,8 @@ from pipeline.store.new import first_experiment
 from pipeline.store.results import prepare_output
 from pipeline.study.typical_creep import creep_record
 from pipeline.study.virtual_test import virtual_test
+
+KINDS = tuple(product((1.5, 1.9, 2.4), (None, 0.1)))  # pitch in radii; Poisson's ratio if not the lattice's
 
 
 @dataclass(frozen=True)
@@ -54,7 +61,15 @@ class Batch:
         """Make a virtual test with effects, if it was not made before."""
         if not (bundle / "truth.json").exists():
             of_all = {"creep": 0.0} if self.creep else {}
-            asked = sorted((of_all | dict(effects or {})).items())
+            acting = of_all | dict(effects or {})
+            pitch, ratio = KINDS[seed % len(KINDS)]
             virtual_test(
-                bundle, seed=seed, geometry=self.geometry, radius_mm=self.radius_mm, creep=self.creep, effect=asked
+                bundle,
+                seed=seed,
+                geometry=self.geometry,
+                radius_mm=self.radius_mm,
+                creep=self.creep,
+                effect=sorted(acting.items()),
+                pitch=pitch,
+                poissons_ratio=None if acting.get("creep") else ratio,  # bonds that creep carry no shear
             )

@@ -32,7 +32,7 @@ from pipeline.store.results import prepare_output
 from pipeline.store.simulation import SimulationStore
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import build_model
-from pipeline.study.batch import Batch
+from pipeline.study.batch import KINDS, Batch
 from pipeline.study.diagnose_case import ENGINE, Simulator, band_of
 from pipeline.study.diagnose_sight import beside, seen
 from pipeline.study.engines import engine as engine_of
@@ -105,7 +105,8 @@ def write_entry(file: Path, entry: Entry) -> None:
         raw = json.loads(file.read_text("utf-8"))
         old = parse(raw) if raw.get("format") == FORMAT else []
     others = [e for e in old if not same(e.domain, entry.domain)]
-    told = {"version": __version__, "engine": ENGINE, "pitch": "1.9 radii, irregular"}
+    kinds = [f"pitch {pitch:g} radii, {'shear' if ratio else 'no shear'} in bonds" for pitch, ratio in KINDS]
+    told = {"version": __version__, "engine": ENGINE, "networks": "; ".join(kinds)}
     entries = sorted([*others, entry], key=lambda e: (e.domain.geometry, e.domain.radius))
     write_atomically(file, written(entries, told).encode())
 

@@ -65,6 +65,8 @@ class Request:
     noise_grey : float; standard deviation of one of their pixels, in grey values of 0 to 255
     frames : int; images or fields from the beginning of the loading to the end
     effect : (name, value) pairs; what the model leaves out
+    pitch : float; of the network, in particle radii of the bundle's lattice
+    poissons_ratio : float; of what is broken, that of the bundle where not given; below its limit bonds carry shear
     """
 
     geometry: str | None = None
@@ -83,6 +85,8 @@ class Request:
     noise_grey: float | None = None
     frames: int | None = None
     effect: Sequence[tuple[str, float]] | None = None
+    pitch: float = PITCH
+    poissons_ratio: float | None = None
 
     def __post_init__(self) -> None:
         for name, value in self.effect or ():
@@ -290,15 +294,16 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
     phase_map, _ = read_phases(bundle)
     recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
-    pitch = PITCH * bundle.model.radius
     nominal = mixture(bundle)
+    if request.poissons_ratio:
+        nominal = replace(nominal, poissons_ratio=request.poissons_ratio)
     return break_network(
         bundle.specimen,
         phase_at,
         nominal,
         truth,
         recording,
-        pitch,
+        request.pitch * bundle.model.radius,
         rng,
         find_equilibria,
         plan=planned(bundle.specimen, nominal, request.effects),
@@ -327,7 +332,12 @@ def _truth_text(
         "radius_mm": truth.radius / MM,
         "bond_fracture_energy_j_per_m2": truth.f_max * truth.delta_max / (2 * truth.radius * bundle.specimen.thickness),
         "seed": settings.seed,
-        "network": {"pitch_mm": test.pitch / MM, "points": test.particles, "bonds": test.bonds},
+        "network": {
+            "pitch_mm": test.pitch / MM,
+            "points": test.particles,
+            "bonds": test.bonds,
+            "poissons_ratio": request.poissons_ratio or bundle.experiment.material.poissons_ratio,
+        },
         "factors": vars(test.factors),
         "noise": _noise(request),
         "effects": request.effects,

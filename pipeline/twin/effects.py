@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.twin.problem import PhaseAt
 
+AnyLaw = TypeVar("AnyLaw", CentralSoftening, MixedSoftening)
 VOID_DIAMETER = (1.2e-3, 3.0e-3)  # m, of unseen voids
 
 
@@ -64,7 +65,7 @@ def with_effects(problem: Problem, plan: Plan) -> Problem:
     factors = plan.factors(place)
     law = law.times(factors.stiffness, factors.strength, factors.opening)
     if plan.spent:
-        law = _hurt(law, np.hypot(*(place.middle - plan.specimen.tip).T) <= plan.spent_radius, plan.spent)
+        law = walked(law, np.hypot(*(place.middle - plan.specimen.tip).T) <= plan.spent_radius, plan.spent)
     grips = problem.grips
     if plan.eccentricity:
         regions = [
@@ -85,20 +86,26 @@ def _leaning(name: str, friction: float) -> np.ndarray:
     return np.array([np.sin(turn), np.cos(turn)])
 
 
-def _hurt(law: CentralSoftening | MixedSoftening, near: np.ndarray, spent: float) -> CentralSoftening:
-    """Bonds that have walked a part of their straight softening branch."""
-    if isinstance(law, MixedSoftening):
-        raise UnavailableError(
-            "damage at the tip of bonds that carry shear is not in this version: set poissons_ratio to its limit"
-        )
+def walked(law: AnyLaw, near: np.ndarray, spent: float) -> AnyLaw:
+    """Bonds, those `near` having walked a share of their straight softening branches, opening and sliding alike."""
     if law.softening.left(np.array([0.5]))[0] != 0.5:
         raise UnavailableError("damage at the tip together with another softening shape is not in this version")
-    k_n, f_max = law.k_n.copy(), law.f_max.copy()
-    for bond in np.flatnonzero(near & np.isfinite(f_max)):
-        peak = f_max[bond] / k_n[bond]
-        f_max[bond] *= 1 - spent
-        k_n[bond] = f_max[bond] / (peak + spent * (law.delta_max[bond] - peak))
-    return replace(law, k_n=k_n, f_max=f_max)
+    hurt = near & np.isfinite(law.f_max)
+    k_n, f_max = _on_branch(law.k_n, law.f_max, law.delta_max, hurt, spent)
+    if isinstance(law, CentralSoftening):
+        return replace(law, k_n=k_n, f_max=f_max)
+    k_s, f_shear = _on_branch(law.k_s, law.f_shear, law.delta_shear, hurt, spent)
+    return replace(law, k_n=k_n, f_max=f_max, k_s=k_s, f_shear=f_shear)
+
+
+def _on_branch(
+    stiffness: np.ndarray, strength: np.ndarray, end: np.ndarray, hurt: np.ndarray, spent: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and strength of a branch whose share `spent` lies behind it."""
+    peak = np.where(hurt, strength, 0.0) / stiffness
+    left = np.where(hurt, (1 - spent) * strength, strength)
+    reached = np.where(hurt, peak + spent * (np.where(hurt, end, 0.0) - peak), 1.0)
+    return np.where(hurt, left / reached, stiffness), left
 
 
 def put_down(problem: Problem, solution: Solution, plan: Plan) -> Solution:

@@ -27,11 +27,25 @@ def test_a_test_is_made_once_with_what_was_asked_for(tmp_path, monkeypatch):
     for _ in range(2):
         Batch(tmp_path, "dct", 1.5).make(tmp_path / "test", 7, {"modulus": 0.1, "creep": 1.0})
     effect = [("creep", 1.0), ("modulus", 0.1)]
-    asked = {"seed": 7, "geometry": "dct", "radius_mm": 1.5}
-    assert made == [{**asked, "creep": None, "effect": effect}]
+    asked = {"seed": 7, "geometry": "dct", "radius_mm": 1.5, "pitch": 1.5}
+    assert made == [{**asked, "creep": None, "effect": effect, "poissons_ratio": None}]  # what creeps carries no shear
     sheet = tmp_path / "creep.csv"
     Batch(tmp_path, "dct", 1.5, creep=sheet).make(tmp_path / "still", 7, {"modulus": 0.1})
-    assert made[1:] == [{**asked, "creep": sheet, "effect": [("creep", 0.0), ("modulus", 0.1)]}]  # that nothing creeps
+    still = [("creep", 0.0), ("modulus", 0.1)]  # nothing creeps unless asked for
+    assert made[1:] == [{**asked, "creep": sheet, "effect": still, "poissons_ratio": 0.1}]
+
+
+def test_specimens_are_networks_of_all_kinds(tmp_path, monkeypatch):
+    made = []
+
+    def virtual_test(out, *, pitch, poissons_ratio, **asked):
+        made.append((pitch, poissons_ratio))
+
+    monkeypatch.setattr("pipeline.study.batch.virtual_test", virtual_test)
+    for seed in range(9000, 9006):
+        Batch(tmp_path).make(tmp_path / f"{seed}", seed)
+    assert len(set(made)) == 6
+    assert {ratio for _, ratio in made} == {None, 0.1}
 
 
 def test_the_entry_is_of_the_geometry_and_radius(tmp_path):

@@ -14,8 +14,9 @@ from pipeline.gap.effects import effect, library
 from pipeline.gap.observation import Reading, Sight
 from pipeline.gap.plan import Plan
 from pipeline.materials.elastic import Plane
+from pipeline.materials.mixed_softening import MixedSoftening
 from pipeline.materials.mixture import Mixture
-from pipeline.twin.effects import SPOILED, Record, refuse_unknown, spoiled, with_voids
+from pipeline.twin.effects import SPOILED, Record, refuse_unknown, spoiled, walked, with_voids
 from pipeline.twin.problem import one_phase
 
 BEAM = SingleEdgeNotchedBeam(60e-3, 130e-3, 137e-3, 40e-3, 15e-3)
@@ -101,6 +102,18 @@ def test_voids_take_their_share_of_the_mastic():
 
 def test_no_voids_no_change():
     assert with_voids(one_phase, BEAM, 0.0, np.random.default_rng(0)) is one_phase
+
+
+def test_damaged_bonds_that_slide_have_walked_the_same_share_of_both_branches():
+    law = MixedSoftening(*(np.full(2, v) for v in (1e8, 4e7, 200.0, 150.0, 1e-4, 8e-5)))
+    hurt = walked(law, np.array([True, False]), 0.25)
+    for k, f, end, k0, f0 in (
+        (hurt.k_n, hurt.f_max, hurt.delta_max, 1e8, 200.0), (hurt.k_s, hurt.f_shear, hurt.delta_shear, 4e7, 150.0),
+    ):  # fmt: skip
+        assert np.allclose(f, [0.75 * f0, f0])
+        assert k[1] == k0
+        assert f[0] / k[0] == pytest.approx(f0 / k0 + 0.25 * (end[0] - f0 / k0))  # the place on the old branch
+        assert end[0] in (1e-4, 8e-5)
 
 
 @pytest.mark.parametrize("names", [("rate_law_per_decade",), ("creep", "tip_damage")])
