@@ -34,7 +34,7 @@ def calibrate(batch: Batch, file: Path, seeds: Sequence[int], effects: int = 6) 
     InputError
         for seeds that the library was learnt from, or too few
     """
-    benches = unseen(batch, file, seeds)
+    benches = unseen(batch.with_creep(), file, seeds)
     trials: list[Trial] = []
     for bench in benches:
         batch.progress.stage(f"trials of seed {bench.seed}")

@@ -81,7 +81,7 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
     file : library; an entry of the same geometry and radius is replaced, others stay
     seeds : of the specimens, at least four, without gaps
     """
-    entry, radius = provisional(batch.geometry), batch.radius_mm * MM
+    entry, radius, batch = provisional(batch.geometry), batch.radius_mm * MM, batch.with_creep()
     for turn in ("a first", "a second"):
         specimens = []
         for seed in seeds:

@@ -27,7 +27,7 @@ from pipeline.store.start import start_parameters
 from pipeline.study.batch import Batch
 from pipeline.study.diagnose_case import ENGINE, Case, prepared
 from pipeline.study.diagnose_result import estimate
-from pipeline.study.diagnose_sight import beside, seen
+from pipeline.study.diagnose_sight import seen
 from pipeline.study.effects import Band
 
 FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
@@ -158,8 +158,7 @@ class Bench:
         usual = seen(read_bundle(first))
         look, band = case.look, case.band
         if usual.path is not None and case.look.path is not None and _apart(usual.path, case.look.path) < NEAR:
-            band = Band(usual.path, band.half)
-            look = replace(look, observation=beside(seen(read_bundle(bundle)).observation, usual.path))
+            band = Band(usual.path, band.half)  # which points lie too near the crack, its own path says
         if look.observation.sight.cmod[-1] <= usual.abscissae.field[-1]:
             look = replace(look, abscissae=usual.abscissae)
         simulator = replace(case.simulator, band=band, abscissae=look.abscissae)
