@@ -1,4 +1,4 @@
-"""Fits the temperature of the library of discrepancies: python scripts/gap_calibration.py OUT --specimens 12"""
+"""Fits the temperature of the library of discrepancies: python scripts/gap_calibration.py OUT LEARNT --specimens 12"""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pipeline.terminal import Display
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="folder of the trials; a stopped run goes on in it")
+    parser.add_argument("learnt", type=Path, help="folder that the library was made in")
     parser.add_argument("--file", type=Path, default=Path("pipeline/gap/library.json"))
     parser.add_argument("--specimens", type=int, default=12)
     parser.add_argument("--first-seed", type=int, default=9100)
@@ -23,7 +24,7 @@ def main() -> None:
     seeds = range(asked.first_seed, asked.first_seed + asked.specimens)
     with Display() as progress:
         batch = Batch(asked.out, asked.geometry, asked.radius_mm, progress)
-        told = calibrate(batch, asked.file, seeds, asked.effects)
+        told = calibrate(batch, asked.file, asked.learnt, seeds, asked.effects)
     print(told)
 
 

@@ -47,6 +47,10 @@ class Batch:
         """The folder of a specimen."""
         return self.out / f"{self.geometry}-{self.radius_mm:g}-{seed:04d}"
 
+    def slides(self, seed: int) -> bool:
+        """Whether the bonds of a specimen carry shear."""
+        return KINDS[seed % len(KINDS)][1] is not None
+
     def entry(self, entries: list[Entry]) -> Entry:
         """The entry of a library to judge the specimens by."""
         return nearest(entries, self.geometry, self.radius_mm * MM)

@@ -1,4 +1,9 @@
-"""Calibration of the probabilities: trials on specimens that the library has not seen, with effects of random size."""
+"""Calibration of the probabilities: trials on specimens that the library has not seen, with effects of random size.
+
+A material is of no kind that a library has met. So every specimen is judged by an entry that was learnt on networks of
+the other kind: where its bonds carry shear on those that carry none, and the other way round. What ships is learnt on
+both; how sure it may be of something new is measured so. (What creeps carries no shear, in either half.)
+"""
 
 from __future__ import annotations
 
@@ -14,18 +19,19 @@ from pipeline.gap.calibration import Answer, Calibration, calibrated, expected_e
 from pipeline.gap.effects import effect
 from pipeline.gap.library import parse
 from pipeline.study.batch import Batch
-from pipeline.study.gap_library import same, write_entry
+from pipeline.study.gap_library import UNMET, same, write_entry
 from pipeline.study.gap_trials import Bench, Trial, unseen
 
 SIZES = (0.15, 1.0)  # of the plausible maximum, log-uniform
 
 
-def calibrate(batch: Batch, file: Path, seeds: Sequence[int], effects: int = 6) -> str:
+def calibrate(batch: Batch, file: Path, learnt: Path, seeds: Sequence[int], effects: int = 6) -> str:
     """Make trials, fit the temperature, write it into the library; goes on where it stopped.
 
     Parameters
     ----------
     file : library
+    learnt : folder that the library was made in, with the entries of either kind
     seeds : of the specimens, none of the library's
     effects : tests with an effect for every specimen, beside one without
 
@@ -34,18 +40,19 @@ def calibrate(batch: Batch, file: Path, seeds: Sequence[int], effects: int = 6) 
     InputError
         for seeds that the library was learnt from, or too few
     """
-    benches = unseen(batch.with_creep(), file, seeds)
+    batch = batch.with_creep()
     trials: list[Trial] = []
-    for bench in benches:
-        batch.progress.stage(f"trials of seed {bench.seed}")
+    for seed in seeds:
+        batch.progress.stage(f"trials of seed {seed}")
+        [bench] = unseen(batch, learnt / UNMET[batch.slides(seed)], [seed])
         trials += specimen_trials(bench, effects)
     answers = [answer(t) for t in trials]
     if len({a.group for a in answers}) < 2:
         raise InputError("a temperature needs trials of at least two specimens")
     found = calibrated(answers)
-    used = benches[0].entry.domain
-    learnt = next(e for e in parse(json.loads(file.read_text("utf-8"))) if same(e.domain, used))
-    write_entry(file, replace(learnt, temperature=found.temperature, tests=found.tests))
+    used = batch.entry(parse(json.loads(file.read_text("utf-8")))).domain
+    entry = next(e for e in parse(json.loads(file.read_text("utf-8"))) if same(e.domain, used))  # as it was learnt
+    write_entry(file, replace(entry, temperature=found.temperature, tests=found.tests))
     return told(found, answers)
 
 

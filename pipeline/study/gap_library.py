@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,6 +41,7 @@ FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
 STEP = 1e-3  # of the grid: central differences
+UNMET = {True: "without-shear.json", False: "with-shear.json"}  # in OUT: learnt on all that slides, or on none
 
 
 log = logging.getLogger("pipeline.study")
@@ -74,7 +75,8 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
     The grids of the specimens are laid twice: with what is assumed before anything is known, and with what was learnt
     after that, as a diagnosis lays them.
 
-    A specimen whose baseline cannot be simulated is left out.
+    A specimen whose baseline cannot be simulated is left out. Two more entries, each of the specimens whose bonds carry
+    shear or do not, are left in the batch's folder for the calibration (`UNMET`).
 
     Parameters
     ----------
@@ -83,15 +85,19 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
     """
     entry, radius, batch = provisional(batch.geometry), batch.radius_mm * MM, batch.with_creep()
     for turn in ("a first", "a second"):
-        specimens = []
+        specimens: dict[int, Specimen] = {}
         for seed in seeds:
             batch.progress.stage(f"specimen of seed {seed}, {turn} time")
             try:
-                specimens.append(one_specimen(batch, seed, workers, entry))
+                specimens[seed] = one_specimen(batch, seed, workers, entry)
             except ConvergenceError as error:
                 log.warning("the specimen of seed %d is left out: %s", seed, error)
-        domain = Domain(batch.geometry, (HOLDS[0] * radius, HOLDS[1] * radius), _last(specimens), NOISE)
-        entry = replace(learnt(specimens, domain), seeds=(seeds[0], seeds[-1]))
+        domain = Domain(batch.geometry, (HOLDS[0] * radius, HOLDS[1] * radius), _last(specimens.values()), NOISE)
+        entry = replace(learnt([*specimens.values()], domain), seeds=(seeds[0], seeds[-1]))
+    batch.progress.stage("what each half would know of the other")
+    for slides, name in UNMET.items():
+        others = [specimen for seed, specimen in specimens.items() if batch.slides(seed) != slides]
+        write_entry(batch.out / name, replace(learnt(others, domain), seeds=entry.seeds))
     write_entry(file, entry)
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
         f"{mode} {value:.2f}" for mode, value in entry.check.items()
@@ -183,5 +189,5 @@ def learnt(specimens: Sequence[Specimen], domain: Domain) -> Entry:
     )
 
 
-def _last(specimens: Sequence[Specimen]) -> float:
+def _last(specimens: Iterable[Specimen]) -> float:
     return float(max(s.observation.sight.cmod.max() for s in specimens))

@@ -10,11 +10,12 @@ import pytest
 
 from pipeline.core.errors import InputError
 from pipeline.gap.effects import effect, library
-from pipeline.gap.library import shipped
+from pipeline.gap.library import parse, shipped, written
 from pipeline.store.results import plain
 from pipeline.study.batch import Batch
 from pipeline.study.gap_calibration import answer, calibrate, drawn, sized
 from pipeline.study.gap_confusion import summary, table
+from pipeline.study.gap_library import UNMET
 from pipeline.study.gap_trials import Trial, _apart, read_trial
 
 FREE = Trial(
@@ -87,13 +88,36 @@ def test_an_answer_is_right_by_its_label():
     assert answer(FOUND).truth == "cmod_gain"
 
 
-def test_the_librarys_own_specimens_are_refused(tmp_path):
-    file = tmp_path / "library.json"
-    from pipeline.gap.library import written
+def kept(folder, seeds) -> None:
+    """Libraries as a run of `make_library` leaves them."""
+    for name in UNMET.values():
+        file = folder / name
+        file.write_text(written([replace(shipped()[0], seeds=seeds)], {}), "utf-8")
 
-    file.write_text(written([replace(shipped()[0], seeds=(9000, 9023))], {}), "utf-8")
+
+def test_the_librarys_own_specimens_are_refused(tmp_path):
+    kept(tmp_path, (9000, 9023))
     with pytest.raises(InputError, match="made the library"):
-        calibrate(Batch(tmp_path), file, [9023, 9024])
+        calibrate(Batch(tmp_path), tmp_path / "library.json", tmp_path, [9023, 9024])
+
+
+def test_every_specimen_is_judged_by_what_was_learnt_on_the_other_kind(tmp_path, monkeypatch):
+    judged, file = [], tmp_path / "library.json"
+    kept(tmp_path, (9000, 9023))
+    file.write_text(written([replace(shipped()[0], temperature=9.0)], {}), "utf-8")
+
+    def unseen(batch, learnt, seeds):
+        judged.append((batch.slides(*seeds), learnt.name))
+        return seeds
+
+    monkeypatch.setattr("pipeline.study.gap_calibration.unseen", unseen)
+    trials = "pipeline.study.gap_calibration.specimen_trials"
+    monkeypatch.setattr(trials, lambda seed, _: [replace(FOUND, seed=seed)])
+    calibrate(Batch(tmp_path), file, tmp_path, [9102, 9103])
+    assert sorted(judged) == [(False, "with-shear.json"), (True, "without-shear.json")]
+    [entry] = parse(json.loads(file.read_text("utf-8")))
+    assert entry.temperature != 9.0
+    assert entry.tests == 2
 
 
 def test_paths_lie_apart_where_both_are():
