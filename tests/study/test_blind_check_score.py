@@ -115,6 +115,14 @@ def test_calibration_of_what_is_always_right():
     assert calibration(every)[0] == pytest.approx(0.0)
 
 
+def test_calibration_where_one_of_ten_lacks_an_effect_as_half_of_the_priors_do():
+    """Always said: none, 0.6. Of nine effects and one test without, that is 0.5 too much; half and half, 0.1."""
+    truths = {str(k): row("modulus", str(k)) for k in range(9)} | {"9": row(None, "9")}
+    every = paired(truths, {name: said("none", 0.6) for name in truths})
+    assert calibration(every)[0] == pytest.approx(0.5)
+    assert calibration(every, even=True)[0] == pytest.approx(0.1)
+
+
 def test_against_shuffled_truth_a_right_diagnosis_is_at_chance():
     labels = [name for name in EFFECTS for _ in range(10)]
     verdicts = {str(k): said(name) for k, name in enumerate(labels)}

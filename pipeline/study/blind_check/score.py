@@ -187,13 +187,22 @@ def _sure(case: Scored) -> float:
     return float(sum(p for n, p in chances.items() if set(n.split(" + ")) <= named))
 
 
-def calibration(cases: Sequence[Scored]) -> tuple[float | None, list[dict[str, Any]]]:
-    """Expected calibration error of the top label, and the reliability diagram's bins."""
+def calibration(cases: Sequence[Scored], even: bool = False) -> tuple[float | None, list[dict[str, Any]]]:
+    """Expected calibration error of the top label, and the reliability diagram's bins.
+
+    Parameters
+    ----------
+    cases : sequence of Scored
+    even : bool; those with and without an effect count alike in the error, as the prior of every diagnosis has it
+    """
     if not cases:
         return None, []
     p = np.array([c.probability for c in cases])
     right = np.array([float(c.right) for c in cases])
+    none = np.array([c.kind == "none" for c in cases])
+    weight = np.where(none, 1 / max(none.sum(), 1), 1 / max((~none).sum(), 1)) if even else np.ones(len(cases))
     place = np.minimum((p * BINS).astype(int), BINS - 1)
+    bins = [m for m in (place == k for k in range(BINS)) if m.any()]
     rows: list[dict[str, Any]] = [
         {
             "stated": float(p[m].mean()),
@@ -201,11 +210,9 @@ def calibration(cases: Sequence[Scored]) -> tuple[float | None, list[dict[str, A
             "cases": float(m.sum()),
             "interval_95": list(wilson(float(right[m].sum()), float(m.sum()))),
         }
-        for m in (place == k for k in range(BINS))
-        if m.any()
+        for m in bins
     ]
-    error = sum(r["cases"] * abs(r["stated"] - r["achieved"]) for r in rows) / len(cases)
-    return float(error), rows
+    return float(sum(abs(weight[m] @ (p - right)[m]) for m in bins) / weight.sum()), rows
 
 
 def confusion(cases: Sequence[Scored]) -> dict[str, dict[str, int]]:
@@ -297,6 +304,7 @@ def scores(truth: Mapping[str, Any], verdicts: Mapping[str, Any]) -> dict[str, A
         "coverage_90": share(inside, lambda c: c.covered),
         "set_size": {"value": _mean(sizes), "interval_95": _bootstrap(sizes), "cases": len(sizes)},
         "ece": {"value": ece, "interval_95": _ece_interval(inside), "cases": len(inside)},
+        "ece_even": {"value": calibration(inside, even=True)[0], "interval_95": None, "cases": len(inside)},
         "reliability": bins,
         "outside_recall": share(outside, called_outside),
         "outside_recall_at_5_limits": share(clear_outside, called_outside),
