@@ -89,6 +89,23 @@ def test_a_free_crack_is_as_strong_and_costs_as_much_as_a_straight_one():
     assert area == pytest.approx(np.trapezoid(straight.load, straight.cmod), rel=0.04)  # within 2 % at 2 mm
 
 
+SHORT = replace(BEAM, span=0.13, length=0.137)  # breaks at a higher load: its platen presses harder
+
+
+@pytest.mark.parametrize("beside", [0.0, 8.0, -8.0])
+def test_nothing_parts_under_the_platen_wherever_it_presses(beside):
+    middle = setup_of(sample(SHORT, eccentricity_mm=beside), np.random.default_rng(3)).body.middle
+    near = {x: np.hypot(middle[:, 0] - x * 1e-3, middle[:, 1] - SHORT.depth).min() for x in (0.0, beside)}
+    assert near.pop(beside) > SHORT.guard
+    assert all(distance < SHORT.guard for distance in near.values())  # where it would press without the effect
+
+
+def test_a_beam_loaded_beside_its_notch_breaks_from_its_notch():
+    chosen = replace(sample(SHORT, eccentricity_mm=8.0), material=replace(MATERIAL, shear=SLIDING))
+    straight, free = (solve(setup_of(chosen, np.random.default_rng(1), way), 0.1e-3) for way in (True, False))
+    assert free.load.max() == pytest.approx(straight.load.max(), rel=0.04)  # as loaded in the middle; here 1 %
+
+
 EFFECTS = {
     "creep": (1.0, -0.3, -0.01), "modulus": (0.3, 0.01, 0.3), "thermal_gradient": (0.4, -0.3, 0.3),
     "support_friction": (0.3, 0.02, 0.3), "eccentricity_mm": (6.0, 0.0, 0.3), "notch_length_mm": (2.0, -0.2, -0.01),
