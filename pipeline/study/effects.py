@@ -19,6 +19,7 @@ from pipeline.materials.cohesive import CentralSoftening, LinearSoftening
 from pipeline.materials.creeping_mixture import creeping_law
 from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.materials.mixed_softening import MixedSoftening
+from pipeline.materials.rate_softening import RateSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.microstructure.packing import hexagonal_packing
 from pipeline.microstructure.phases import lay_phases
@@ -120,10 +121,11 @@ def lattice_problem(model: Model, plan: Plan, problem: Problem, f_max: float, de
     changed = law.times(stiffness, strength, factors.opening)
     if plan.spent:
         changed = _spent(changed, plan, place.middle)
+    rated = _at_its_rate(changed, plan)
     grips = _grips(model, plan, particles)
     clock = test_clock(model.bundle) if plan.creep else None
     return replace(
-        problem, specimen=plan.specimen, particles=particles, bonds=bonds, law=changed, grips=grips, clock=clock
+        problem, specimen=plan.specimen, particles=particles, bonds=bonds, law=rated, grips=grips, clock=clock
     )
 
 
@@ -138,17 +140,28 @@ def _law(
     return creeping_law(mixture, mastic, bonds, thickness, f_max, delta_max)
 
 
+def _at_its_rate(
+    law: CentralSoftening | MixedSoftening | CreepingSoftening, plan: Plan
+) -> CentralSoftening | MixedSoftening | CreepingSoftening | RateSoftening:
+    """The law with strengths that depend on the rate of opening."""
+    if not plan.strength_per_decade:
+        return law
+    if not isinstance(law, CentralSoftening):
+        raise UnavailableError(
+            "strength that rises with the rate of opening is not simulated for bonds that creep or carry shear"
+        )
+    return RateSoftening(law, plan.strength_per_decade)
+
+
 def held_to(problem: Problem, band: Band) -> Problem:
     """The same test; bonds outside the band take no damage."""
     law = problem.law
-    assert isinstance(law, CentralSoftening | MixedSoftening | CreepingSoftening)
+    assert isinstance(law, CentralSoftening | MixedSoftening | CreepingSoftening | RateSoftening)
     inside = band.holds(problem.particles.position[problem.bonds.pairs].mean(axis=1))
     return problem.with_law(law.spared(~inside))
 
 
 def _refuse(plan: Plan) -> None:
-    if plan.strength_per_decade:
-        raise UnavailableError("a rate law is not simulated by this version: its laws do not know the rate of opening")
     if plan.specimen.geometry != "seb" and (plan.eccentricity or plan.friction):
         raise UnavailableError("eccentricity and friction are simulated for seb only")
 

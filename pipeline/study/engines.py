@@ -10,6 +10,7 @@ from functools import partial
 from pipeline import __version__
 from pipeline.core.errors import InputError, UnavailableError
 from pipeline.core.problem import Problem, Solution
+from pipeline.study.opening_rate import solve_at_rates
 
 REFINED = "equilibrium, refined"  # for the cross-check: much nearer to the limit than what it is to judge
 FORWARD = "equilibrium, machine forward"  # the same, and jumps where the explicit engines must jump
@@ -21,6 +22,8 @@ TIGHTER = 0.1  # of the tolerance
 @dataclass(frozen=True)
 class Engine:
     """A solver and the label under which its solutions are kept.
+
+    Laws that depend on the rate of opening are followed by any of them (`study.opening_rate`).
 
     Parameters
     ----------
@@ -50,6 +53,12 @@ def engine(name: str, ranks: int = 1) -> Engine:
     InputError
         for ranks of an engine that has none
     """
+    bare = _at_constant_rate(name, ranks)
+    return replace(bare, solve=partial(solve_at_rates, solve=bare.solve))
+
+
+def _at_constant_rate(name: str, ranks: int) -> Engine:
+    """The engine itself, which knows no rate of opening."""
     if ranks > 1 and name != "lammps":
         raise InputError(f"ranks = {ranks}: engine {name} runs in one process, leave --ranks out or use lammps")
     if name == "lammps":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_
 from pipeline.study.creep_analysis import mastic_creep
 from pipeline.study.effects import planned
 from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
+from pipeline.study.opening_rate import solve_at_rates
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
 from pipeline.twin.virtual_test import virtual_test as break_network
@@ -305,7 +307,7 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
         recording,
         request.pitch * bundle.model.radius,
         rng,
-        find_equilibria,
+        partial(solve_at_rates, solve=find_equilibria),
         plan=planned(bundle.specimen, nominal, request.effects),
         mastic=_mastic(bundle, request),
         measuring=request.measuring,

@@ -18,6 +18,7 @@ from pipeline.core.units import KN, MINUTE, UM
 from pipeline.gap.plan import Place, Plan
 from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.mixed_softening import MixedSoftening
+from pipeline.materials.rate_softening import RateSoftening
 from pipeline.microstructure.attachment import attach_regions
 from pipeline.twin.problem import PhaseAt
 
@@ -27,8 +28,8 @@ VOID_DIAMETER = (1.2e-3, 3.0e-3)  # m, of unseen voids
 
 def refuse_unknown(plan: Plan) -> None:
     """Refuse what the network cannot follow."""
-    if plan.strength_per_decade:
-        raise UnavailableError("virtual tests with a rate law are not in this version")
+    if plan.strength_per_decade and plan.creep:
+        raise UnavailableError("virtual tests with creep and a rate law together are not in this version")
     if plan.creep and plan.spent:
         raise UnavailableError("virtual tests with creep and damage at the tip together are not in this version")
     if plan.specimen.geometry != "seb" and (plan.eccentricity or plan.friction):
@@ -77,7 +78,18 @@ def with_effects(problem: Problem, plan: Plan) -> Problem:
         grips = tuple(
             replace(g, direction=_leaning(g.name, plan.friction)) if g.role is Role.REACT else g for g in grips
         )
+    if plan.strength_per_decade:
+        law = _at_its_rate(law, plan.strength_per_decade)
     return replace(problem, law=law, grips=grips)
+
+
+def _at_its_rate(law: CentralSoftening | MixedSoftening, per_decade: float) -> RateSoftening:
+    """The law with strengths that depend on the rate of opening; whoever solves the problem must know that law."""
+    if isinstance(law, MixedSoftening):
+        raise UnavailableError(
+            "a rate law of bonds that carry shear is not in this version: set poissons_ratio to its limit"
+        )
+    return RateSoftening(law, per_decade)
 
 
 def _leaning(name: str, friction: float) -> np.ndarray:

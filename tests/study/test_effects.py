@@ -20,13 +20,14 @@ from pipeline.store.new import Contents, write_bundle
 from pipeline.study.assembly import Model, build_model
 from pipeline.study.diagnose import unlearnt
 from pipeline.study.effects import Band, held_to, lattice_problem, physics_effects, planned, settled
+from pipeline.study.engines import engine
 from tests.helpers.bundles import DELTA_MAX, F_MAX, coarse_experiment, edit
 
 MASTIC = Burgers(0.1e-9, 0.04e-9, 1500e9, 15.0)
 ELASTIC = 0.004 * MM  # of CMOD: nothing softens yet
 SIMULATED = [
     "modulus", "thermal_gradient", "support_friction", "eccentricity_mm", "notch_length_mm", "tip_damage",
-    "softening_shape", "air_voids", "aggregate_strength", "interface_ratio",
+    "softening_shape", "air_voids", "aggregate_strength", "interface_ratio", "rate_law_per_decade",
 ]  # fmt: skip
 
 
@@ -135,9 +136,26 @@ def test_damage_is_held_to_the_band(model):
     assert np.isfinite(found.law.f_max[inside]).all()
 
 
-def test_what_no_engine_can_do_is_refused(model):
-    with pytest.raises(UnavailableError, match="not simulated"):
-        changed(model, rate_law_per_decade=0.1)
+def test_a_rate_law_is_the_law_of_the_mouths_rate_and_its_value(model):
+    plain, found = changed(model).law, changed(model, rate_law_per_decade=0.1).law
+    assert found.per_decade == 0.1
+    for name in ("k_n", "f_max", "delta_max"):
+        assert np.array_equal(getattr(found, name), getattr(plain, name))
+    band = Band(np.array([[0, 15], [0, 40]]) * MM, 6 * MM)
+    held = [held_to(changed(model, rate_law_per_decade=v), band).law for v in (0.0, 0.1)]
+    assert np.array_equal(held[0].f_max, held[1].f_max)
+    both = changed(model, rate_law_per_decade=0.1, softening_shape=0.5).law
+    assert both.law.softening == changed(model, softening_shape=0.5).law.softening
+
+
+def test_a_rate_law_lowers_the_load_of_every_softening_by_the_engine_of_that_name(model):
+    equilibria, late = engine("equilibrium").solve, 0.08 * MM
+    for shape in (0.0, 0.7):
+        with_it, without = (
+            equilibria(changed(model, late, rate_law_per_decade=v, softening_shape=shape)).curve.load.max()
+            for v in (0.2, 0.0)
+        )
+        assert 0.85 < with_it / without < 0.99  # 0.3 to 0.6 decades slower than the mouth
 
 
 @pytest.fixture(scope="module")
@@ -162,6 +180,11 @@ def test_creep_takes_its_part_of_the_load_in_the_time_of_the_test(creeping_model
 def test_creep_without_a_creep_test_is_refused(model):
     with pytest.raises(InputError, match=r"has no creep\.csv: add the creep compliance"):
         changed(model, creep=1.0)
+
+
+def test_a_rate_law_of_bonds_that_creep_is_refused(creeping_model):
+    with pytest.raises(UnavailableError, match="creep or carry shear"):
+        changed(creeping_model, rate_law_per_decade=0.1, creep=1.0)
 
 
 def test_shear_strength_is_refused_where_bonds_carry_no_shear(model):
@@ -217,6 +240,11 @@ def test_the_diagnosis_warns_of_bonds_that_its_library_does_not_know(model, slid
 def test_damage_at_the_tip_is_refused_where_bonds_carry_shear(sliding_model):
     with pytest.raises(UnavailableError, match="bonds that carry no shear"):
         changed(sliding_model, tip_damage=0.3)
+
+
+def test_a_rate_law_is_refused_where_bonds_carry_shear(sliding_model):
+    with pytest.raises(UnavailableError, match="creep or carry shear"):
+        changed(sliding_model, rate_law_per_decade=0.1)
 
 
 def test_only_physics_is_simulated():

@@ -116,7 +116,7 @@ def test_damaged_bonds_that_slide_have_walked_the_same_share_of_both_branches():
         assert end[0] in (1e-4, 8e-5)
 
 
-@pytest.mark.parametrize("names", [("rate_law_per_decade",), ("creep", "tip_damage")])
+@pytest.mark.parametrize("names", [("creep", "rate_law_per_decade"), ("creep", "tip_damage")])
 def test_what_the_network_cannot_do_is_refused(names):
     plan = Plan(BEAM, MIXTURE)
     for name in names:
