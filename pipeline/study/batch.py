@@ -22,6 +22,7 @@ from pipeline.study.typical_creep import creep_record
 from pipeline.study.virtual_test import virtual_test
 
 KINDS = tuple(product((1.5, 1.9, 2.4), (None, 0.1)))  # pitch in radii; Poisson's ratio if not the lattice's
+CENTRAL = frozenset({"creep", "rate_law_per_decade"})  # effects for which there is no law of bonds that slide
 
 
 @dataclass(frozen=True)
@@ -75,5 +76,5 @@ class Batch:
                 creep=self.creep,
                 effect=sorted(acting.items()),
                 pitch=pitch,
-                poissons_ratio=None if acting.get("creep") else ratio,  # bonds that creep carry no shear
+                poissons_ratio=None if any(acting.get(name) for name in CENTRAL) else ratio,
             )

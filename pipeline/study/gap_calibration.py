@@ -2,7 +2,8 @@
 
 A material is of no kind that a library has met. So every specimen is judged by an entry that was learnt on networks of
 the other kind: where its bonds carry shear on those that carry none, and the other way round. What ships is learnt on
-both; how sure it may be of something new is measured so. (What creeps carries no shear, in either half.)
+both; how sure it may be of something new is measured so. (What creeps or depends on the rate carries no shear in
+either half.)
 """
 
 from __future__ import annotations
