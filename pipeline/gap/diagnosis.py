@@ -331,7 +331,9 @@ def confirmed(emulator: Emulator, simulate: Simulate, fits: Mapping[str, Fitted]
     likely = [
         fits[label]
         for label in scored.ranked()
-        if scored.probability[label] >= LIKELY and label in emulator.signatures and fits[label].amplitudes[0] != 0
+        if scored.probability[label] >= LIKELY
+        and label in emulator.signatures
+        and emulator.signatures[label].large(float(fits[label].amplitudes[0]))
     ][:CONFIRMED]
     runs = [_run_of(f) for f in likely]
     for found, outcome in zip(likely, simulate(runs) if runs else [], strict=True):

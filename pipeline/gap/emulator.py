@@ -19,6 +19,7 @@ from pipeline.inverse.surrogate import LagrangeSurrogate
 
 MARGIN = 0.1  # of the grid's width, by which parameters may leave it
 RASTER = 0.08  # of the logarithm of parameters: signatures are simulated at places so far apart
+LARGE = 0.2  # of the larger value that a signature was simulated at
 SHIFTS = (0.85, 1.0, 1.15)  # of the stations: data that a shift along the CMOD would lose are left out for all alike
 
 
@@ -56,8 +57,12 @@ class Signature:
         middle = np.sum(self.values**3) / np.sum(self.values**2)
         return np.asarray(value * np.sqrt(np.mean((self.values - middle) ** 2)) * curvature)
 
+    def large(self, value: float) -> bool:
+        """Whether an error at this value says something of others: in proportion, that of a tiny one is all scatter."""
+        return bool(abs(value) >= LARGE * np.abs(self.values).max())
+
     def corrected(self, value: float, error: np.ndarray) -> Signature:
-        """With a change that grows in proportion to the value and is `error` (n,) at this one."""
+        """With a change that grows in proportion to the value, which is `large`, and is `error` (n,) at this one."""
         return replace(self, changes=self.changes + np.outer(self.values / value, error))
 
 

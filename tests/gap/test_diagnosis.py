@@ -232,6 +232,15 @@ def test_what_does_not_grow_in_proportion_to_an_effect_is_doubted():
     assert all(np.abs(onward.doubt(value)).max() > 0.2 * value for value in np.linspace(0.05, 1.0, 20))  # never sure
 
 
+def test_what_a_tiny_value_is_off_by_says_nothing_of_others():
+    """A fit that ends at 1e-17 of an effect once made its signature 1e17 times what one simulation scatters."""
+    steep = Signature(np.array([0.35, 0.75]), np.ones((2, 3)))
+    assert [steep.large(v) for v in (0.0, 1e-17, 0.1, 0.16, -0.5, 1.0)] == [False, False, False, True, True, True]
+    met = steep.corrected(0.16, np.full(3, 0.5))
+    assert np.allclose(met.at(0.16), steep.at(0.16) + 0.5)  # meets the simulation
+    assert np.abs(met.changes - steep.changes).max() <= 0.5 / LARGE  # and no value by more than that
+
+
 def test_an_effect_is_seen_less_where_it_is_doubted():
     change, doubt = np.array([3.0, 4.0]), np.array([[0.0], [2.0]])
     assert np.allclose(doubted(change, doubt), (3.0, 4.0 / np.sqrt(5)))
