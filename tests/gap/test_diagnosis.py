@@ -10,7 +10,7 @@ import pytest
 from pipeline.core.errors import ConvergenceError
 from pipeline.gap.diagnosis import Run, baseline, diagnose, with_placements
 from pipeline.gap.effects import library
-from pipeline.gap.emulator import Signature
+from pipeline.gap.emulator import LARGE, Signature
 from pipeline.gap.identifiability import card
 from pipeline.gap.metric import doubted
 from pipeline.gap.observation import Observation, Reading
