@@ -111,3 +111,7 @@ class PhysicsEffect(Effect):
     @abstractmethod
     def change(self, value: float, plan: Plan) -> Plan:
         """The plan with the effect in it."""
+
+    def strength_ratio(self, value: float, faster: float) -> float:
+        """Factor on f_max in a test whose mouth opens so many times as fast."""
+        return 1.0

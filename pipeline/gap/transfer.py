@@ -11,8 +11,10 @@ from pipeline.core.errors import ConvergenceError
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.closure import Closure, closure, folds, held_out, left_by_complete
 from pipeline.gap.diagnosis import Diagnosis, Run, Simulate
+from pipeline.gap.effect import PhysicsEffect
 from pipeline.gap.effects import effect
 from pipeline.gap.emulator import Emulator
+from pipeline.gap.fit import Fitted
 from pipeline.gap.score import NONE, names_of
 
 REPLICATE, OTHER = "replicate", "other condition"
@@ -27,7 +29,7 @@ class Test:
     name : str
     diagnosis : Diagnosis
     area : float, m²; f_max over it is a traction that all tests of a material share
-    condition : what replicates have in common: geometry, rate, temperature
+    condition : what replicates have in common: geometry, CMOD rate (m/s, or None), temperature
     simulate : Simulate; of this test
     """
 
@@ -36,8 +38,17 @@ class Test:
     name: str
     diagnosis: Diagnosis
     area: float
-    condition: tuple[str | float | None, ...]
+    condition: tuple[str, float | None, float | None]
     simulate: Simulate
+
+    def strength_ratio(self, source: Test, found: Fitted) -> float:
+        """f_max here over that of another test, of what was fitted there: of the areas, and of the rates by effects."""
+        ratio, mine, theirs = self.area / source.area, self.condition[1], source.condition[1]
+        for name, value in zip(_owners(found.candidate), found.amplitudes, strict=True):
+            one = effect(name)
+            if isinstance(one, PhysicsEffect) and mine and theirs:
+                ratio *= one.strength_ratio(float(value), mine / theirs)
+        return ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +123,11 @@ def _to(
     return found
 
 
+def _owners(candidate: Candidate) -> list[str]:
+    """The effect of every amplitude."""
+    return [n for n, m in zip(candidate.names, candidate.magnitudes, strict=True) for _ in range(m.directions)]
+
+
 def _carries(name: str, kind: str) -> bool:
     """Whether an effect is as large in the target as in the sources."""
     belongs = effect(name).belongs
@@ -124,11 +140,11 @@ def _carried(target: Test, sources: Sequence[Test], kind: str, label: str) -> Ca
     None where the target cannot be simulated there.
     """
     d, fits = target.diagnosis, [s.diagnosis.fits[label] for s in sources]
-    scale = [np.array([target.area / s.area, 1.0]) for s in sources]
+    scale = [np.array([target.strength_ratio(s, f), 1.0]) for s, f in zip(sources, fits, strict=True)]
     parameters = np.median([f.parameters * x for f, x in zip(fits, scale, strict=True)], axis=0)
     size = np.median([f.amplitudes for f in fits], axis=0)
     whole = fits[0].candidate
-    owner = [n for n, m in zip(whole.names, whole.magnitudes, strict=True) for _ in range(m.directions)]
+    owner = _owners(whole)
     open_ = np.array([not _carries(n, kind) for n in owner], bool)
     physics = {
         n: float(a) for n, a in zip(owner, size, strict=True) if effect(n).kind == "physics" and _carries(n, kind)
@@ -168,7 +184,8 @@ def _reaching(target: Test, parameters: np.ndarray, physics: Mapping[str, float]
             raise ConvergenceError(outcome)
         if run.effects:
             [(name, value)] = run.effects
-            emulator = emulator.with_confirmed(name, value, parameters, outcome.flat())
+            if emulator.signatures[name].large(value):
+                emulator = emulator.with_confirmed(name, value, parameters, outcome.flat())
         else:
             emulator = emulator.confirmed(parameters, outcome.flat())
     return emulator

@@ -2,8 +2,8 @@
 
 A material is of no kind that a library has met. So every specimen is judged by an entry that was learnt on networks of
 the other kind: where its bonds carry shear on those that carry none, and the other way round. What ships is learnt on
-both; how sure it may be of something new is measured so. (What creeps or depends on the rate carries no shear in
-either half.)
+both; how sure it may be of something new is measured so. (What creeps or depends on the rate carries no shear in either
+half: these few tests are of a kind that was met.)
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def calibrate(batch: Batch, file: Path, learnt: Path, seeds: Sequence[int], effe
         for seeds that the library was learnt from, or too few
     """
     batch = batch.with_creep()
+    benches = [bench for seed in seeds for bench in unseen(batch, learnt / UNMET[batch.slides(seed)], [seed])]
     trials: list[Trial] = []
-    for seed in seeds:
-        batch.progress.stage(f"trials of seed {seed}")
-        [bench] = unseen(batch, learnt / UNMET[batch.slides(seed)], [seed])
+    for bench in benches:
+        batch.progress.stage(f"trials of seed {bench.seed}")
         trials += specimen_trials(bench, effects)
     answers = [answer(t) for t in trials]
     if len({a.group for a in answers}) < 2:

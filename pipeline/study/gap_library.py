@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline import __version__
 from pipeline.config import RunSettings
-from pipeline.core.errors import ConvergenceError
+from pipeline.core.errors import ConvergenceError, InputError
 from pipeline.core.units import MM
 from pipeline.gap.candidate import Candidate
 from pipeline.gap.diagnosis import baseline, with_placements, with_signatures
@@ -41,7 +41,11 @@ FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
 STEP = 1e-3  # of the grid: central differences
-UNMET = {True: "without-shear.json", False: "with-shear.json"}  # in OUT: learnt on all that slides, or on none
+UNMET = {
+    True: "without-shear.json",
+    False: "with-shear.json",
+}  # in OUT: of specimens that slide or not, what the others say
+FEWEST = 4  # specimens of either half
 
 
 log = logging.getLogger("pipeline.study")
@@ -81,8 +85,17 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
     Parameters
     ----------
     file : library; an entry of the same geometry and radius is replaced, others stay
-    seeds : of the specimens, at least four, without gaps
+    seeds : of the specimens, without gaps; at least `FEWEST` whose bonds carry shear, and as many others
+
+    Raises
+    ------
+    InputError
+        for fewer
     """
+    if min(sum(batch.slides(seed) == slides for seed in seeds) for slides in UNMET) < FEWEST:
+        raise InputError(
+            f"{len(seeds)} specimens are too few to learn from either half of them: take {2 * FEWEST} or more"
+        )
     entry, radius, batch = provisional(batch.geometry), batch.radius_mm * MM, batch.with_creep()
     for turn in ("a first", "a second"):
         specimens: dict[int, Specimen] = {}
@@ -94,24 +107,25 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
                 log.warning("the specimen of seed %d is left out: %s", seed, error)
         domain = Domain(batch.geometry, (HOLDS[0] * radius, HOLDS[1] * radius), _last(specimens.values()), NOISE)
         entry = replace(learnt([*specimens.values()], domain), seeds=(seeds[0], seeds[-1]))
+    write_entry(file, entry)
     batch.progress.stage("what each half would know of the other")
     for slides, name in UNMET.items():
-        others = [specimen for seed, specimen in specimens.items() if batch.slides(seed) != slides]
-        write_entry(batch.out / name, replace(learnt(others, domain), seeds=entry.seeds))
-    write_entry(file, entry)
+        others = {seed: specimen for seed, specimen in specimens.items() if batch.slides(seed) != slides}
+        half = replace(learnt([*others.values()], domain), seeds=entry.seeds)
+        write_entry(batch.out / name, half, [kind for kind in KINDS if (kind[1] is not None) != slides])
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
         f"{mode} {value:.2f}" for mode, value in entry.check.items()
     )
 
 
-def write_entry(file: Path, entry: Entry) -> None:
-    """Put an entry into a library, in the place of that of its geometry and radius."""
+def write_entry(file: Path, entry: Entry, learnt_on: Sequence[tuple[float, float | None]] = KINDS) -> None:
+    """Put an entry, of so many kinds of networks, into a library, in the place of that of its geometry and radius."""
     old: list[Entry] = []
     if file.exists():
         raw = json.loads(file.read_text("utf-8"))
         old = parse(raw) if raw.get("format") == FORMAT else []
     others = [e for e in old if not same(e.domain, entry.domain)]
-    kinds = [f"pitch {pitch:g} radii, {'shear' if ratio else 'no shear'} in bonds" for pitch, ratio in KINDS]
+    kinds = [f"pitch {pitch:g} radii, {'shear' if ratio else 'no shear'} in bonds" for pitch, ratio in learnt_on]
     told = {"version": __version__, "engine": ENGINE, "networks": "; ".join(kinds)}
     entries = sorted([*others, entry], key=lambda e: (e.domain.geometry, e.domain.radius))
     write_atomically(file, written(entries, told).encode())

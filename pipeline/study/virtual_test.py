@@ -93,6 +93,8 @@ class Request:
     def __post_init__(self) -> None:
         for name, value in self.effect or ():
             checked(name, value)
+        if not (np.isfinite(self.pitch) and self.pitch > 0):
+            raise InputError(f"pitch = {self.pitch:g} particle radii of the network must be positive")
         if len({name for name, _ in self.effect or ()}) < len(self.effect or ()):
             raise InputError("an effect is given twice: give each once, with its whole value")
         if self.images and self.measuring:
@@ -297,7 +299,7 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
     recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
     nominal = mixture(bundle)
-    if request.poissons_ratio:
+    if request.poissons_ratio is not None:
         nominal = replace(nominal, poissons_ratio=request.poissons_ratio)
     return break_network(
         bundle.specimen,
@@ -338,7 +340,9 @@ def _truth_text(
             "pitch_mm": test.pitch / MM,
             "points": test.particles,
             "bonds": test.bonds,
-            "poissons_ratio": request.poissons_ratio or bundle.experiment.material.poissons_ratio,
+            "poissons_ratio": mixture(bundle).poissons_ratio
+            if request.poissons_ratio is None
+            else request.poissons_ratio,
         },
         "factors": vars(test.factors),
         "noise": _noise(request),

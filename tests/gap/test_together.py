@@ -24,7 +24,7 @@ def diagnosed(name: str, amplitude: float, seed: int, effect_name: str = GIVES, 
     put_in = ([effect_name], [amplitude]) if amplitude else ((), ())
     seen = measured(*put_in, np.random.default_rng(seed), truth=truth)
     found = diagnose(seen, ABSCISSAE, simulate, START, entry(), np.random.default_rng(0), SOME, FEW)
-    return Test(name, found, 1.0, (condition,), simulate)
+    return Test(name, found, 1.0, (condition, 1e-5, None), simulate)
 
 
 @pytest.fixture(scope="module")
@@ -98,14 +98,14 @@ def test_parameters_are_carried_as_tractions_and_simulated_where_the_grid_ends()
     one = diagnosed("a", 0.2, 0, "modulus")
     seen = measured(["modulus"], [0.2], np.random.default_rng(1))
     other = diagnose(seen, ABSCISSAE, doubled, (2.0, 1.0), entry(), np.random.default_rng(0), SOME, FEW)
-    two = Test("b", other, 2.0, ("dct",), doubled)
+    two = Test("b", other, 2.0, ("dct", 1e-5, None), doubled)
     assert not asked.clear()
     rows = [t for t in together([one, two], np.random.default_rng(0)).transfers if t.label == "modulus"]
     assert all(row.carried == ("modulus",) for row in rows)
     assert not asked  # f_max of one, doubled, lies in the grid of the other
     for row in rows:
         assert row.closure.whole.after < 1.3 * row.closure.whole.floor + 0.5
-    far = Test("b", other, 1.0, ("dct",), doubled)  # as if its bonds were as large: f_max of 1 lies outside
+    far = Test("b", other, 1.0, ("dct", 1e-5, None), doubled)  # as if its bonds were as large: f_max of 1 lies outside
     together([one, far], np.random.default_rng(0))
     assert asked
     assert max(run.f_max for run in asked) < 1.3
@@ -122,3 +122,17 @@ def test_a_median_card_has_the_median_limit_and_needs_most_tests_to_see():
 
 def test_every_effect_says_to_what_it_belongs():
     assert {effect(n).belongs for n in library()} == {"material", "set-up", "test"}
+
+
+def test_strength_that_rises_with_the_rate_is_taken_to_the_rate_of_the_other_test():
+    """0.2 a decade, after two components of a drift that have no part in it."""
+    source = diagnosed("a", 0.0, 0)
+    names = ("drift_um_per_min", "rate_law_per_decade")
+    candidate = replace(
+        source.diagnosis.best.candidate, names=names, magnitudes=tuple(effect(n).magnitude for n in names)
+    )
+    found = replace(source.diagnosis.best, candidate=candidate, amplitudes=np.array([5.0, -3.0, 0.2]))
+    slower = replace(source, area=2.0, condition=("seb", 1e-6, None))
+    assert slower.strength_ratio(source, found) == pytest.approx(2 * 0.8)
+    assert source.strength_ratio(slower, found) == pytest.approx(0.5 * 1.2)
+    assert replace(slower, condition=("seb", None, None)).strength_ratio(source, found) == 2.0  # a rate nobody knows

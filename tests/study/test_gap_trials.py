@@ -15,8 +15,8 @@ from pipeline.store.results import plain
 from pipeline.study.batch import Batch
 from pipeline.study.gap_calibration import answer, calibrate, drawn, sized
 from pipeline.study.gap_confusion import summary, table
-from pipeline.study.gap_library import UNMET
-from pipeline.study.gap_trials import Trial, _apart, read_trial
+from pipeline.study.gap_library import UNMET, make_library
+from pipeline.study.gap_trials import Bench, Trial, _apart, read_trial
 
 FREE = Trial(
     seed=9100,
@@ -101,6 +101,12 @@ def test_the_librarys_own_specimens_are_refused(tmp_path):
         calibrate(Batch(tmp_path), tmp_path / "library.json", tmp_path, [9023, 9024])
 
 
+def test_halves_too_small_to_learn_from_are_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(InputError, match="7 specimens are too few"):
+        make_library(Batch(tmp_path / "out"), tmp_path / "library.json", range(9000, 9007))
+    assert not (tmp_path / "out").exists()
+
+
 def test_every_specimen_is_judged_by_what_was_learnt_on_the_other_kind(tmp_path, monkeypatch):
     judged, file = [], tmp_path / "library.json"
     kept(tmp_path, (9000, 9023))
@@ -108,11 +114,11 @@ def test_every_specimen_is_judged_by_what_was_learnt_on_the_other_kind(tmp_path,
 
     def unseen(batch, learnt, seeds):
         judged.append((batch.slides(*seeds), learnt.name))
-        return seeds
+        return [Bench(batch, *seeds, shipped()[0])]
 
     monkeypatch.setattr("pipeline.study.gap_calibration.unseen", unseen)
     trials = "pipeline.study.gap_calibration.specimen_trials"
-    monkeypatch.setattr(trials, lambda seed, _: [replace(FOUND, seed=seed)])
+    monkeypatch.setattr(trials, lambda bench, _: [replace(FOUND, seed=bench.seed)])
     calibrate(Batch(tmp_path), file, tmp_path, [9102, 9103])
     assert sorted(judged) == [(False, "with-shear.json"), (True, "without-shear.json")]
     [entry] = parse(json.loads(file.read_text("utf-8")))

@@ -113,7 +113,6 @@ def test_damaged_bonds_that_slide_have_walked_the_same_share_of_both_branches():
         assert np.allclose(f, [0.75 * f0, f0])
         assert k[1] == k0
         assert f[0] / k[0] == pytest.approx(f0 / k0 + 0.25 * (end[0] - f0 / k0))  # the place on the old branch
-        assert end[0] in (1e-4, 8e-5)
 
 
 @pytest.mark.parametrize("names", [("creep", "rate_law_per_decade"), ("creep", "tip_damage")])

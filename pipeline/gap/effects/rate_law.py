@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from pipeline.gap.effect import Magnitude, PhysicsEffect
@@ -18,3 +19,6 @@ class RateLaw(PhysicsEffect):
 
     def change(self, value: float, plan: Plan) -> Plan:
         return replace(plan, strength_per_decade=value)
+
+    def strength_ratio(self, value: float, faster: float) -> float:
+        return max(1 + value * math.log10(faster), 0.0)
