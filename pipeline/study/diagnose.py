@@ -126,7 +126,7 @@ def unlearnt(model: Model) -> list[str]:
     if model.mixture.shear_ratio:
         found.append(
             f"bonds carry shear at poissons_ratio = {model.mixture.poissons_ratio:g}; the library of discrepancies was "
-            "learnt by a lattice whose bonds carry none: what models differ by may be larger here than the gate allows for"
+            "learnt by a lattice whose bonds carry none: what models differ by may be larger here than the gate allows"
         )
     if model.phase_map is None:
         found.append(
