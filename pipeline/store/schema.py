@@ -170,9 +170,9 @@ def text_of(file: h5py.File, name: str) -> str | None:
 
 
 def _put(file: h5py.File, entry: Entry, value: Any) -> None:
-    if entry.shape is None and entry.dtype == "str" and len(str(value).encode()) > LONGEST:
-        raise StoreError(f"{entry.name} has more than {LONGEST} bytes of text: an attribute of HDF5 holds no more")
     if entry.shape is None:
+        if entry.dtype == "str" and len(str(value).encode()) > LONGEST:
+            raise StoreError(f"{entry.name} has more than {LONGEST} bytes of text: an attribute of HDF5 holds no more")
         file.attrs[entry.name] = _encoded(value) if entry.dtype == "str" else np.dtype(entry.dtype).type(value)
         return
     array = _encoded(value) if entry.dtype == "str" else np.asarray(value, entry.dtype)

@@ -51,8 +51,8 @@ def calibrate(batch: Batch, file: Path, learnt: Path, seeds: Sequence[int], effe
     if len({a.group for a in answers}) < 2:
         raise InputError("a temperature needs trials of at least two specimens")
     found = calibrated(answers)
-    used = batch.entry(parse(json.loads(file.read_text("utf-8")))).domain
-    entry = next(e for e in parse(json.loads(file.read_text("utf-8"))) if same(e.domain, used))  # as it was learnt
+    entries = parse(json.loads(file.read_text("utf-8")))
+    entry = next(e for e in entries if same(e.domain, batch.entry(entries).domain))  # as it was learnt
     write_entry(file, replace(entry, temperature=found.temperature, tests=found.tests))
     return told(found, answers)
 

@@ -110,8 +110,8 @@ def make_library(batch: Batch, file: Path, seeds: Sequence[int], workers: int | 
     write_entry(file, entry)
     batch.progress.stage("what each half would know of the other")
     for slides, name in UNMET.items():
-        others = {seed: specimen for seed, specimen in specimens.items() if batch.slides(seed) != slides}
-        half = replace(learnt([*others.values()], domain), seeds=entry.seeds)
+        others = [specimen for seed, specimen in specimens.items() if batch.slides(seed) != slides]
+        half = replace(learnt(others, domain), seeds=entry.seeds)
         write_entry(batch.out / name, half, [kind for kind in KINDS if (kind[1] is not None) != slides])
     return f"{len(specimens)} specimens; chi-square over degrees of freedom of left-out ones: " + ", ".join(
         f"{mode} {value:.2f}" for mode, value in entry.check.items()

@@ -21,6 +21,7 @@ from pipeline.equilibrium.solve import solve as find_equilibria
 from pipeline.execution.progress import Progress, Silent
 from pipeline.gap.effects import checked, effect
 from pipeline.materials.burgers import Burgers
+from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.gradation import Grading, fuller_section
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle, read_bundle
@@ -298,9 +299,7 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
     phase_map, _ = read_phases(bundle)
     recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
-    nominal = mixture(bundle)
-    if request.poissons_ratio is not None:
-        nominal = replace(nominal, poissons_ratio=request.poissons_ratio)
+    nominal = _nominal(bundle, request)
     return break_network(
         bundle.specimen,
         phase_at,
@@ -314,6 +313,12 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
         mastic=_mastic(bundle, request),
         measuring=request.measuring,
     )
+
+
+def _nominal(bundle: Bundle, request: Request) -> Mixture:
+    """What is broken, but for effects."""
+    known = mixture(bundle)
+    return known if request.poissons_ratio is None else replace(known, poissons_ratio=request.poissons_ratio)
 
 
 def _mastic(bundle: Bundle, request: Request) -> Burgers | None:
@@ -340,9 +345,7 @@ def _truth_text(
             "pitch_mm": test.pitch / MM,
             "points": test.particles,
             "bonds": test.bonds,
-            "poissons_ratio": mixture(bundle).poissons_ratio
-            if request.poissons_ratio is None
-            else request.poissons_ratio,
+            "poissons_ratio": _nominal(bundle, request).poissons_ratio,
         },
         "factors": vars(test.factors),
         "noise": _noise(request),

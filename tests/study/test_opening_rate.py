@@ -47,7 +47,7 @@ def test_a_bond_that_opens_at_a_share_of_the_mouths_rate_is_as_strong_as_the_for
     exact = BOND.times(1.0, factor, 1.0).force(at, at)
     assert found.curve.load_at(lever * at) == pytest.approx(
         exact, rel=5e-4
-    )  # which the gauge meets to a share of its travel
+    )  # the gauge is met to a share of its travel
     assert "after simulation 2" in found.message  # the rate is the lever's whatever the strength
 
 
