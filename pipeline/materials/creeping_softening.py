@@ -20,6 +20,7 @@ another stiffness and another origin, which an engine may minimise as it does wi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -151,7 +152,7 @@ class CreepingSoftening:
         """K(0) (m,), N/m."""
         return self.rise.instantaneous
 
-    @property
+    @cached_property
     def delta_peak(self) -> np.ndarray:
         """f_max/K(0) (m,), m: where softening would begin without any creep."""
         return self.f_max / self.rise.instantaneous
