@@ -1,7 +1,7 @@
 """Identify creeping virtual tests with and without creep and print the table of docs/accuracy.md.
 
 usage: python scripts/creep_twins.py OUT [--geometries seb,dct] [--seeds 1,2,3,4,5] [--radius-mm 0.6]
-       [--objective both] [--engine lammps] [--workers N]
+       [--objective both] [--engine lammps] [--no-elastic] [--workers N]
 Finished simulations are kept in OUT: the same call goes on where it stopped.
 """
 
@@ -19,9 +19,10 @@ if __name__ == "__main__":
     parser.add_argument("--radius-mm", type=float, default=0.6)
     parser.add_argument("--objective", default="both")
     parser.add_argument("--engine", default="lammps")
+    parser.add_argument("--no-elastic", dest="elastic", action="store_false", help="fit with creep only")
     parser.add_argument("--workers", type=int)
     given = parser.parse_args()
-    how = {name: getattr(given, name) for name in ("radius_mm", "objective", "engine", "workers")}
+    how = {name: getattr(given, name) for name in ("radius_mm", "objective", "engine", "elastic", "workers")}
     seeds = [int(seed) for seed in given.seeds.split(",")]
     with Display() as progress:
         found = list(creep_twins(given.out, given.geometries.split(","), seeds, progress=progress, **how))

@@ -18,14 +18,16 @@ from pipeline.study.identify import identify
 from pipeline.study.trials import Trial, compare
 from pipeline.study.virtual_test import virtual_test
 
+NOT_FITTED = 4 * [""]  # cells
+
 
 @dataclass(frozen=True)
 class CreepTwin:
-    """One creeping virtual test and what both fits make of it."""
+    """One creeping virtual test and what the fit with creep, and the one without where it was asked for, make of it."""
 
     name: str
     viscoelastic: Trial
-    elastic: Trial
+    elastic: Trial | None
 
 
 def creep_twins(
@@ -36,6 +38,7 @@ def creep_twins(
     radius_mm: float,
     objective: str = "both",
     engine: str = "lammps",
+    elastic: bool = True,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[CreepTwin]:
@@ -50,6 +53,7 @@ def creep_twins(
     seeds : of section, network, truth and noise
     radius_mm : of the identifying lattice
     objective, engine, workers : as of `identify`
+    elastic : whether to fit without creep, too
     """
     told = progress or Silent()
     folder.mkdir(parents=True, exist_ok=True)
@@ -61,7 +65,7 @@ def creep_twins(
             if not (bundle / "truth.json").is_file():
                 virtual_test(bundle, seed=seed, geometry=geometry, radius_mm=radius_mm, creep=sheet, progress=told)
             truth, found = json.loads((bundle / "truth.json").read_text("utf-8")), []
-            for creeps in (True, False):
+            for creeps in (True, False) if elastic else (True,):
                 out = folder / f"{bundle.name}-{objective}-{'viscoelastic' if creeps else 'elastic'}"
                 identify(
                     bundle,
@@ -73,32 +77,48 @@ def creep_twins(
                     progress=told,
                 )
                 found.append(compare(f"{geometry}, seed {seed}", truth, read_result(out)))
-            yield CreepTwin(found[0].name, *found)
+            yield CreepTwin(found[0].name, found[0], found[1] if elastic else None)
 
 
 def twin_table(twins: Sequence[CreepTwin]) -> str:
-    """Trials as a Markdown table, the medians and the worst of each geometry at its foot."""
-    what = "f_max | delta_max | G_f | truth in interval"
-    rows = [f"| test | viscoelastic: {what} | elastic: {what} |", "|---|" + 8 * "---|"]
-    for one in twins:
-        rows.append(f"| {one.name} | {_fit(one.viscoelastic)} | {_fit(one.elastic)} |")
+    """Trials as a Markdown table; medians, the worst and how many intervals hold the truth at each geometry's foot."""
+    head = ([f"{fit}: f_max", "delta_max", "G_f", "truth in interval"] for fit in ("viscoelastic", "elastic"))
+    rows = [_row("test", head), "|---|" + 8 * "---|"]
+    rows += [_row(one.name, (_fit(one.viscoelastic), _fit(one.elastic))) for one in twins]
     for geometry in dict.fromkeys(one.name.split(",")[0] for one in twins):
         group = [one for one in twins if one.name.startswith(f"{geometry},")]
-        off = np.array([[_off(one.viscoelastic), _off(one.elastic)] for one in group])
-        worst = np.take_along_axis(off, np.abs(off).argmax(axis=0)[None], axis=0)[0]
-        for name, values in (("median", np.median(off, axis=0)), ("worst", worst)):
-            rows.append(f"| **{name}, {geometry}** | {_told(values[0])} | | {_told(values[1])} | |")
+        feet = [_foot([one.viscoelastic for one in group]), _foot([one.elastic for one in group])]
+        for name, *cells in zip(("median", "worst", "truth inside"), *feet, strict=True):
+            rows.append(_row(f"**{name}, {geometry}**", cells))
     return "\n".join(rows) + "\n"
+
+
+def _row(name: str, fits: Iterable[list[str]]) -> str:
+    cells = [name, *(cell for fit in fits for cell in fit)]
+    return "|" + "".join(f" {cell} |" if cell else " |" for cell in cells)
+
+
+def _fit(trial: Trial | None) -> list[str]:
+    """The four cells of one fit."""
+    if trial is None:
+        return NOT_FITTED
+    return [*_told(_off(trial)), ", ".join("yes" if yes else "no" for yes in (trial.inside_f, trial.inside_delta))]
+
+
+def _foot(trials: Sequence[Trial | None]) -> list[list[str]]:
+    """The four cells of the median, of the worst and of how many hold the truth, of those that were fitted."""
+    fitted = [trial for trial in trials if trial is not None]
+    if not fitted:
+        return 3 * [NOT_FITTED]
+    off = np.array([_off(trial) for trial in fitted])
+    worst = np.take_along_axis(off, np.abs(off).argmax(axis=0)[None], axis=0)[0]
+    inside = [f"{sum(getattr(t, k) for t in fitted)} of {len(fitted)}" for k in ("inside_f", "inside_delta")]
+    return [[*_told(np.median(off, axis=0)), ""], [*_told(worst), ""], [*inside, "", ""]]
 
 
 def _off(trial: Trial) -> list[float]:
     return [trial.f_max - 1, trial.delta_max - 1, trial.energy - 1]
 
 
-def _told(values: Sequence[float] | np.ndarray) -> str:
-    return " | ".join(f"{value:+.1%}" for value in values)
-
-
-def _fit(trial: Trial) -> str:
-    inside = ", ".join("yes" if yes else "no" for yes in (trial.inside_f, trial.inside_delta))
-    return f"{_told(_off(trial))} | {inside}"
+def _told(values: Iterable[float]) -> list[str]:
+    return [f"{value:+.1%}" for value in values]

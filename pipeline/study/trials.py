@@ -152,7 +152,7 @@ def compare(name: str, truth: dict[str, Any], result: dict[str, Any]) -> Trial:
 
 
 def trial_table(trials: Sequence[Trial]) -> str:
-    """Trials as a Markdown table, the medians and the worst at its foot."""
+    """Trials as a Markdown table; medians, geometric means with their standard errors and the worst at its foot."""
     rows = [
         "| test | f_max | delta_max | G_f | truth in interval (f_max, delta_max) | peak load | seconds "
         "| f_max, delta_max by the paper's multinomial |",
@@ -168,6 +168,8 @@ def trial_table(trials: Sequence[Trial]) -> str:
     for name, of in (("median", np.median), ("worst", _worst)):
         *ours, paper_f, paper_delta = (_off(ratio) for ratio in of(ratios, axis=0))
         rows.append(f"| **{name}** | {' | '.join(ours)} | | | | {paper_f}, {paper_delta} |")
+    if len(trials) > 1:
+        rows.append(f"| **mean ± its standard error** | {' | '.join(_means(ratios[:, :3]))} | | | | |")
     inside_f, inside_d = (sum(getattr(t, k) for t in trials) for k in ("inside_f", "inside_delta"))
     rows.append(f"| **truth inside** | {inside_f} of {len(trials)} | {inside_d} of {len(trials)} | | | | | |")
     return "\n".join(rows) + "\n"
@@ -176,6 +178,13 @@ def trial_table(trials: Sequence[Trial]) -> str:
 def _worst(ratios: np.ndarray, axis: int) -> np.ndarray:
     """The ratio furthest from one of each column."""
     return np.take_along_axis(ratios, np.argmax(np.abs(ratios - 1), axis, keepdims=True), axis)[0]
+
+
+def _means(ratios: np.ndarray) -> list[str]:
+    """Geometric mean and its standard error of each column, for factors are what is looked for."""
+    logs = np.log(ratios)
+    errors = logs.std(axis=0, ddof=1) / np.sqrt(len(logs))
+    return [f"{_off(float(np.exp(mean)))} ± {error:.1%}" for mean, error in zip(logs.mean(axis=0), errors, strict=True)]
 
 
 def _off(ratio: float) -> str:

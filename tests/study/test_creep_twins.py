@@ -118,3 +118,10 @@ def test_medians_and_worst_stand_at_the_foot() -> None:
     assert "| seb, seed 2 | -5.0% | +0.0% | -5.0% | yes, no | +20.0% | -10.0% | +8.0% | yes, no |" in table
     assert "| **median, seb** | -2.0% | +0.0% | -2.0% | | +20.0% | -10.0% | +8.0% | |" in table
     assert "| **worst, seb** | -5.0% | +0.0% | -5.0% | | +20.0% | -10.0% | +8.0% | |" in table
+    assert "| **truth inside, seb** | 2 of 2 | 0 of 2 | | | 2 of 2 | 0 of 2 | | |" in table
+
+
+def test_what_was_not_fitted_without_creep_leaves_its_cells_empty() -> None:
+    table = twin_table([CreepTwin("dct, seed 1", Trial("", 0.9, 1.1, 0.99, (1.0, 1.0), True, True, True, 0, 1), None)])
+    assert "| dct, seed 1 | -10.0% | +10.0% | -1.0% | yes, yes | | | | |" in table
+    assert {line.count("|") for line in table.splitlines()} == {10}  # one table
