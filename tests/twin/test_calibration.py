@@ -11,7 +11,7 @@ from pipeline.equilibrium.solve import solve
 from pipeline.explicit.modes import lowest_modes
 from pipeline.materials.elastic import Plane
 from pipeline.materials.mixture import Mixture
-from pipeline.twin.calibration import PATH, calibrated_factors, check_factors
+from pipeline.twin.calibration import PATH, STRENGTH, calibrated_factors, check_factors
 from pipeline.twin.network import irregular_network
 from pipeline.twin.problem import Truth, one_phase, twin_problem
 
@@ -27,8 +27,10 @@ def test_cut_bonds_carry_strength_and_energy_of_the_lattice(seed: int) -> None:
 
 def test_factors_are_the_closed_forms() -> None:
     factors = calibrated_factors()
-    assert factors.strength == 1
-    assert factors.opening / PATH * (4 / np.pi) == pytest.approx(2 / np.sqrt(3), rel=1e-15)  # round-off
+    assert factors.strength / STRENGTH == 1
+    assert factors.strength * factors.opening / PATH * (4 / np.pi) == pytest.approx(
+        2 / np.sqrt(3), rel=1e-15
+    )  # round-off
 
 
 @pytest.mark.parametrize("poissons_ratio", [0.25, 0.1])
