@@ -88,7 +88,7 @@ def history_force(bonds: Arms, force: np.ndarray, duration: float) -> np.ndarray
 
 def total(bonds: Arms, force: np.ndarray, opening: np.ndarray) -> np.ndarray:
     """Force of the bonds (m,), N, from arm forces (m, k), N, and the whole opening (m,), m."""
-    return bonds.left * opening + force.sum(axis=1)
+    return bonds.left * opening + np.einsum("mk->m", force)
 
 
 def stored(bonds: Arms, force: np.ndarray, opening: np.ndarray) -> np.ndarray:
@@ -119,7 +119,7 @@ def ramp(x: np.ndarray) -> np.ndarray:
 
 
 def _over_arms(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Σ over the arms of products (m, k) → (m,); NumPy's own sum is slow along so short an axis."""
+    """Σ over the arms of products (m, k) → (m,); `sum(axis=1)` is slow along so short an axis."""
     return np.einsum("mk,mk->m", first, second)
 
 

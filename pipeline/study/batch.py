@@ -19,7 +19,7 @@ from pipeline.store.creep import FILE, encode_creep
 from pipeline.store.new import first_experiment
 from pipeline.store.results import prepare_output
 from pipeline.study.typical_creep import creep_record
-from pipeline.study.virtual_test import virtual_test
+from pipeline.study.virtual_test import made_already, virtual_test
 
 KINDS = tuple(product((1.5, 1.9, 2.4), (None, 0.1)))  # pitch in radii; Poisson's ratio if not the lattice's
 CENTRAL = frozenset({"creep", "rate_law_per_decade"})  # effects for which there is no law of bonds that slide
@@ -64,7 +64,7 @@ class Batch:
 
     def make(self, bundle: Path, seed: int, effects: Mapping[str, float] | None = None) -> None:
         """Make a virtual test with effects, if it was not made before."""
-        if not (bundle / "truth.json").exists():
+        if not made_already(bundle):
             of_all = {"creep": 0.0} if self.creep else {}
             acting = of_all | dict(effects or {})
             pitch, ratio = KINDS[seed % len(KINDS)]

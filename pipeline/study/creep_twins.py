@@ -16,9 +16,9 @@ from pipeline.store.results import read_result
 from pipeline.study.creep_trials import MASTIC, READINGS
 from pipeline.study.identify import identify
 from pipeline.study.trials import Trial, compare
-from pipeline.study.virtual_test import virtual_test
+from pipeline.study.virtual_test import made_already, virtual_test
 
-NOT_FITTED = 4 * [""]  # cells
+NOT_FITTED = ("", "", "", "")  # cells
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def creep_twins(
     for geometry in geometries:
         for seed in seeds:
             bundle = folder / f"{geometry}-{seed}"
-            if not (bundle / "truth.json").is_file():
+            if not made_already(bundle):
                 virtual_test(bundle, seed=seed, geometry=geometry, radius_mm=radius_mm, creep=sheet, progress=told)
             truth, found = json.loads((bundle / "truth.json").read_text("utf-8")), []
             for creeps in (True, False) if elastic else (True,):
@@ -93,19 +93,19 @@ def twin_table(twins: Sequence[CreepTwin]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _row(name: str, fits: Iterable[list[str]]) -> str:
+def _row(name: str, fits: Iterable[Sequence[str]]) -> str:
     cells = [name, *(cell for fit in fits for cell in fit)]
     return "|" + "".join(f" {cell} |" if cell else " |" for cell in cells)
 
 
-def _fit(trial: Trial | None) -> list[str]:
+def _fit(trial: Trial | None) -> Sequence[str]:
     """The four cells of one fit."""
     if trial is None:
         return NOT_FITTED
     return [*_told(_off(trial)), ", ".join("yes" if yes else "no" for yes in (trial.inside_f, trial.inside_delta))]
 
 
-def _foot(trials: Sequence[Trial | None]) -> list[list[str]]:
+def _foot(trials: Sequence[Trial | None]) -> Sequence[Sequence[str]]:
     """The four cells of the median, of the worst and of how many hold the truth, of those that were fitted."""
     fitted = [trial for trial in trials if trial is not None]
     if not fitted:

@@ -20,7 +20,15 @@ from pipeline.study.assembly import build_model
 from pipeline.study.engines import engine
 from pipeline.study.filming import Clock
 from pipeline.study.identify import identify
-from pipeline.study.virtual_test import Request, draw_truth, prepare, recording_of, virtual_test, with_noise
+from pipeline.study.virtual_test import (
+    Request,
+    draw_truth,
+    made_already,
+    prepare,
+    recording_of,
+    virtual_test,
+    with_noise,
+)
 from pipeline.twin.virtual_test import exact_record, noisy_record
 
 
@@ -71,7 +79,7 @@ def twin_trial(
     how : radius_mm and others of `virtual_test`
     """
     bundle, out = folder / f"twin-{seed}", folder / f"identified-{seed}-{objective}"
-    if not (bundle / "truth.json").is_file():
+    if not made_already(bundle):
         virtual_test(bundle, seed=seed, progress=progress, **how)
     return _identified(bundle, out, seed, objective, config, progress)
 
@@ -152,7 +160,7 @@ def compare(name: str, truth: dict[str, Any], result: dict[str, Any]) -> Trial:
 
 
 def trial_table(trials: Sequence[Trial]) -> str:
-    """Trials as a Markdown table; medians, geometric means with their standard errors and the worst at its foot."""
+    """Trials as a Markdown table; at its foot medians, the worst and geometric means with their standard errors."""
     rows = [
         "| test | f_max | delta_max | G_f | truth in interval (f_max, delta_max) | peak load | seconds "
         "| f_max, delta_max by the paper's multinomial |",
@@ -169,7 +177,7 @@ def trial_table(trials: Sequence[Trial]) -> str:
         *ours, paper_f, paper_delta = (_off(ratio) for ratio in of(ratios, axis=0))
         rows.append(f"| **{name}** | {' | '.join(ours)} | | | | {paper_f}, {paper_delta} |")
     if len(trials) > 1:
-        rows.append(f"| **mean ± its standard error** | {' | '.join(_means(ratios[:, :3]))} | | | | |")
+        rows.append(f"| **geometric mean ± standard error** | {' | '.join(_means(ratios[:, :3]))} | | | | |")
     inside_f, inside_d = (sum(getattr(t, k) for t in trials) for k in ("inside_f", "inside_delta"))
     rows.append(f"| **truth inside** | {inside_f} of {len(trials)} | {inside_d} of {len(trials)} | | | | | |")
     return "\n".join(rows) + "\n"

@@ -35,6 +35,7 @@ from pipeline.study.creep_analysis import mastic_creep
 from pipeline.study.effects import planned
 from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
 from pipeline.study.opening_rate import solve_at_rates
+from pipeline.twin.calibration import calibrated_factors
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
 from pipeline.twin.virtual_test import virtual_test as break_network
@@ -328,6 +329,26 @@ def _mastic(bundle: Bundle, request: Request) -> Burgers | None:
     if bundle.creep is None:
         raise InputError("the effect creep needs a creep test: give --creep FILE, or --like a bundle with creep.csv")
     return mastic_creep(bundle).burgers
+
+
+def made_already(bundle: Path) -> bool:
+    """Whether a virtual test lies there, made with the network's factors that are in force.
+
+    Raises
+    ------
+    InputError
+        where it was made with others, for its truth is another one
+    """
+    path = bundle / "truth.json"
+    if not path.is_file():
+        return False
+    factors, valid = json.loads(path.read_text("utf-8")).get("factors"), vars(calibrated_factors())
+    if factors != plain(valid):
+        raise InputError(
+            f"{bundle} was made with other factors of the network ({factors}) than are in force ({valid}): "
+            "choose another folder for the output, or go on with the version that began it"
+        )
+    return True
 
 
 def _truth_text(

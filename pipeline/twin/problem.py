@@ -24,12 +24,12 @@ PhaseAt = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Factors:
-    """What makes the irregular network stand for the same continuum as the hexagonal lattice.
+    """What makes a lattice that is fitted to the irregular network agree with the truth (`twin.calibration`).
 
     Parameters
     ----------
     stiffness : float; on K^n, so that E agrees
-    strength : float; on f_max, so that the cohesive strength f_t = √3 f_max/(2rt) agrees
+    strength : float; on f_max, so that the strength f_t = √3 f_max/(2rt) agrees
     opening : float; on δ_max, so that G_f = f_max δ_max/(2rt) agrees, together with `strength`
     """
 

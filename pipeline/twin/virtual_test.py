@@ -105,7 +105,7 @@ class VirtualTest:
     field : DisplacementField with noise, counted by time, from the unloaded state
     exact_curve, exact_field : the same without noise
     factors : Factors of the network
-    check : CutCheck; how well the network stands for the lattice, measured on cuts
+    check : CutCheck; how well the network stands for the lattice, on straight cuts
     pitch : float, m
     loading_begins : float, s, on the clock of the record
     problem : Problem; the network
@@ -203,7 +203,7 @@ def virtual_test(
         exact_curve=curve,
         exact_field=field,
         factors=factors,
-        check=check_factors(network, factors, of_cuts),
+        check=check_factors(network, of_cuts),
         pitch=pitch,
         loading_begins=recording.rest,
         problem=problem,

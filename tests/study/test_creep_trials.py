@@ -1,8 +1,12 @@
 """Trials with creep in the truth: the mastic that is used, and the table."""
 
+import numpy as np
 import pytest
 
-from pipeline.study.creep_trials import MASTIC, READINGS, CreepTrial, creep_table
+from pipeline.execution.progress import Silent
+from pipeline.store.bundle import read_bundle
+from pipeline.study.creep_trials import MASTIC, READINGS, CreepTrial, creep_table, creeping_test
+from pipeline.study.virtual_test import Request
 
 
 def test_the_mastic_creeps_by_what_is_said_of_it():
@@ -23,3 +27,21 @@ def test_medians_stand_at_the_foot_of_each_geometry():
     assert "| seb, seed 2 | +30.0% | -7.0% | +2.0% | -1.0% | yes, no | +27.5% | +40.0% |" in table
     assert "| **median, seb** | +20.0% | -6.0% | +1.0% | +0.0% | | +18.7% | +30.0% |" in table
     assert "| **median, dct** | +5.0% | -1.0% | +0.0% | +0.0% | | +5.0% | +20.0% |" in table
+
+
+def test_a_minimum_on_the_edge_of_the_grid_is_no_shift() -> None:
+    trials = [CreepTrial(f"seb, seed {k}", (1.1, 1.0), (1.0, 1.0), (True, True), s) for k, s in ((1, np.nan), (2, 1.3))]
+    table = creep_table(trials)
+    assert "| seb, seed 1 | +10.0% | +0.0% | +0.0% | +0.0% | yes, yes | +10.0% | edge |" in table
+    assert "| **median, seb** | +10.0% | +0.0% | +0.0% | +0.0% | | +10.0% | +30.0% |" in table
+
+
+def test_a_test_opened_faster_creeps_less(tmp_path) -> None:
+    at_peak = {}
+    for faster in (1.0, 100.0):
+        creeping_test(tmp_path / f"{faster:g}", Request(radius_mm=2.5), 1, Silent(), "equilibrium", faster)
+        bundle = read_bundle(tmp_path / f"{faster:g}")
+        assert bundle.loading.cmod_rate == pytest.approx(faster * 0.5e-3 / 60)
+        at_peak[faster] = bundle.curve.peak()
+    assert at_peak[100.0][0] < at_peak[1.0][0]  # stiffer, so it peaks earlier
+    assert at_peak[100.0][1] > at_peak[1.0][1]

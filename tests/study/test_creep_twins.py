@@ -22,7 +22,8 @@ from pipeline.study.creep_twins import CreepTwin, twin_table
 from pipeline.study.filming import Clock
 from pipeline.study.identify import identify
 from pipeline.study.trials import Trial
-from pipeline.study.virtual_test import Request, draw_truth, run_test, virtual_test
+from pipeline.study.virtual_test import Request, draw_truth, made_already, run_test, virtual_test
+from pipeline.twin.calibration import calibrated_factors
 
 
 @pytest.fixture(scope="module")
@@ -125,3 +126,12 @@ def test_what_was_not_fitted_without_creep_leaves_its_cells_empty() -> None:
     table = twin_table([CreepTwin("dct, seed 1", Trial("", 0.9, 1.1, 0.99, (1.0, 1.0), True, True, True, 0, 1), None)])
     assert "| dct, seed 1 | -10.0% | +10.0% | -1.0% | yes, yes | | | | |" in table
     assert {line.count("|") for line in table.splitlines()} == {10}  # one table
+
+
+def test_a_test_kept_from_other_factors_of_the_network_is_not_gone_on_with(tmp_path: Path) -> None:
+    (tmp_path / "truth.json").write_text(json.dumps({"factors": {**vars(calibrated_factors()), "strength": 1.0}}))
+    with pytest.raises(InputError, match="other factors of the network"):
+        made_already(tmp_path)
+    (tmp_path / "truth.json").write_text(json.dumps({"factors": vars(calibrated_factors())}))
+    assert made_already(tmp_path)
+    assert not made_already(tmp_path / "elsewhere")

@@ -11,7 +11,7 @@ from pipeline.equilibrium.solve import solve
 from pipeline.explicit.modes import lowest_modes
 from pipeline.materials.elastic import Plane
 from pipeline.materials.mixture import Mixture
-from pipeline.twin.calibration import PATH, STRENGTH, calibrated_factors, check_factors
+from pipeline.twin.calibration import PATH, STRAIGHT, calibrated_factors, check_factors
 from pipeline.twin.network import irregular_network
 from pipeline.twin.problem import Truth, one_phase, twin_problem
 
@@ -19,7 +19,7 @@ from pipeline.twin.problem import Truth, one_phase, twin_problem
 @pytest.mark.parametrize("seed", [0, 1])
 def test_cut_bonds_carry_strength_and_energy_of_the_lattice(seed: int) -> None:
     network = irregular_network(PAPER, 1.14 * MM, np.random.default_rng(seed))
-    found = check_factors(network, calibrated_factors(), np.random.default_rng(9), 400)
+    found = check_factors(network, np.random.default_rng(9), 400)
     # four standard errors of the mean of 400 cuts
     assert found.strength == pytest.approx(1, abs=4 * found.strength_std / 20)
     assert found.energy == pytest.approx(1, abs=4 * found.energy_std / 20)
@@ -27,10 +27,9 @@ def test_cut_bonds_carry_strength_and_energy_of_the_lattice(seed: int) -> None:
 
 def test_factors_are_the_closed_forms() -> None:
     factors = calibrated_factors()
-    assert factors.strength / STRENGTH == 1
-    assert factors.strength * factors.opening / PATH * (4 / np.pi) == pytest.approx(
-        2 / np.sqrt(3), rel=1e-15
-    )  # round-off
+    assert STRAIGHT * (4 / np.pi) == pytest.approx(2 / np.sqrt(3), rel=1e-15)  # round-off
+    energy = factors.strength * factors.opening
+    assert energy == pytest.approx(PATH * STRAIGHT, rel=1e-15)  # so is this: strength moves no energy
 
 
 @pytest.mark.parametrize("poissons_ratio", [0.25, 0.1])
