@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 from helpers.bundles import make_bundle
 from helpers.films import make_film
+from hypothesis import settings
+
+settings.register_profile("busy", deadline=None)  # no test asserts seconds: other work may share the machine
+settings.load_profile("busy")
 
 pytest.register_assert_rewrite("helpers.refusals")  # what differs is told, as in the tests themselves
 

@@ -21,7 +21,7 @@ from pipeline.materials.mixture import Mixture
 from pipeline.twin.calibration import CutCheck, calibrated_factors, check_factors
 from pipeline.twin.effects import Record, put_down, refuse_unknown, spoiled, with_effects, with_voids
 from pipeline.twin.network import irregular_network
-from pipeline.twin.problem import Factors, PhaseAt, Truth, twin_problem
+from pipeline.twin.problem import Factors, PhaseAt, Truth, one_phase, twin_problem
 
 PARTED = 0.1  # of delta_max: a bond opened farther no longer joins two crack flanks
 
@@ -172,7 +172,7 @@ def virtual_test(
     """
     plan = Plan(specimen, mixture) if plan is None else plan
     refuse_unknown(plan)
-    factors = calibrated_factors() if factors is None else factors
+    factors = calibrated_factors(stones=phase_at is not one_phase) if factors is None else factors
     of_network, of_noise, of_cuts = rng.spawn(3)
     of_effects = of_network.spawn(1)[0]
     network = irregular_network(plan.specimen, pitch, of_network)

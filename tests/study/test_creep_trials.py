@@ -37,11 +37,10 @@ def test_a_minimum_on_the_edge_of_the_grid_is_no_shift() -> None:
 
 
 def test_a_test_opened_faster_creeps_less(tmp_path) -> None:
-    at_peak = {}
-    for faster in (1.0, 100.0):
+    largest = {}
+    for faster in (1.0, 10.0):
         creeping_test(tmp_path / f"{faster:g}", Request(radius_mm=2.5), 1, Silent(), "equilibrium", faster)
         bundle = read_bundle(tmp_path / f"{faster:g}")
         assert bundle.loading.cmod_rate == pytest.approx(faster * 0.5e-3 / 60)
-        at_peak[faster] = bundle.curve.peak()
-    assert at_peak[100.0][0] < at_peak[1.0][0]  # stiffer, so it peaks earlier
-    assert at_peak[100.0][1] > at_peak[1.0][1]
+        largest[faster] = bundle.curve.peak()[1]
+    assert largest[10.0] > largest[1.0] + 50.0  # N; ten times the noise
