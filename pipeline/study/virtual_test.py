@@ -337,13 +337,17 @@ def made_already(bundle: Path) -> bool:
     Raises
     ------
     InputError
-        where it was made with others, for its truth is another one
+        where it was made with others, for its truth is another one, or does not say with which
     """
     path = bundle / "truth.json"
     if not path.is_file():
         return False
-    factors, valid = json.loads(path.read_text("utf-8")).get("factors"), vars(calibrated_factors())
-    if factors != plain(valid):
+    valid = plain(vars(calibrated_factors()))
+    try:
+        factors = json.loads(path.read_text("utf-8"))["factors"]
+    except (ValueError, KeyError, TypeError):
+        factors = "unknown"
+    if factors != valid:
         raise InputError(
             f"{bundle} was made with other factors of the network ({factors}) than are in force ({valid}): "
             "choose another folder for the output, or go on with the version that began it"

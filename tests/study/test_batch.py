@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from pipeline.gap.library import shipped
 from pipeline.study.batch import Batch
+from pipeline.twin.calibration import calibrated_factors
 
 
 def test_specimens_of_other_kinds_lie_apart(tmp_path):
@@ -21,7 +24,7 @@ def test_a_test_is_made_once_with_what_was_asked_for(tmp_path, monkeypatch):
     def virtual_test(out, **asked):
         made.append(asked)
         out.mkdir()
-        (out / "truth.json").touch()
+        (out / "truth.json").write_text(json.dumps({"factors": vars(calibrated_factors())}))
 
     monkeypatch.setattr("pipeline.study.batch.virtual_test", virtual_test)
     for _ in range(2):

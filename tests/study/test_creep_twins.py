@@ -128,8 +128,11 @@ def test_what_was_not_fitted_without_creep_leaves_its_cells_empty() -> None:
     assert {line.count("|") for line in table.splitlines()} == {10}  # one table
 
 
-def test_a_test_kept_from_other_factors_of_the_network_is_not_gone_on_with(tmp_path: Path) -> None:
-    (tmp_path / "truth.json").write_text(json.dumps({"factors": {**vars(calibrated_factors()), "strength": 1.0}}))
+@pytest.mark.parametrize(
+    "text", [json.dumps({"factors": {**vars(calibrated_factors()), "strength": 1.0}}), "{}", "[", "1"]
+)
+def test_a_test_kept_from_other_factors_of_the_network_is_not_gone_on_with(text: str, tmp_path: Path) -> None:
+    (tmp_path / "truth.json").write_text(text)
     with pytest.raises(InputError, match="other factors of the network"):
         made_already(tmp_path)
     (tmp_path / "truth.json").write_text(json.dumps({"factors": vars(calibrated_factors())}))
