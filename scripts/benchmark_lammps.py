@@ -12,9 +12,11 @@ import numpy as np
 from pipeline.core.units import MM
 from pipeline.lmp.simulate import solve
 from pipeline.store.bundle import read_bundle
+from pipeline.store.new import write_bundle
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import build_model
-from pipeline.study.virtual_test import Request, prepare, write_bundle
+from pipeline.study.request import Request
+from pipeline.study.virtual_test import prepare
 
 CMOD = {"seb": 0.55 * MM, "dct": 0.6 * MM}
 

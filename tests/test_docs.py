@@ -31,8 +31,9 @@ from pipeline.study import (
     model,
     observation,
     paths,
+    request,
     simulate,
-    virtual_test,
+    truth,
     widening,
 )
 
@@ -165,7 +166,7 @@ def test_the_lines_that_write_a_field_file_do_so(tmp_path, monkeypatch):
         simulate.simulate,
         simulate.test_result,
         model.model,
-        virtual_test._truth_text,
+        truth.truth_text,
         dic.dic_result,
         cross_check._result,
         cross_check._run_result,
@@ -200,9 +201,9 @@ def test_every_key_of_a_result_is_explained(function):
             f"by 1/{1 / Increments().far:.0f} of the last CMOD, by 1/{1 / Increments().near:.0f} up to the peak",
         ),
         ("theory", f"while the load exceeds {Increments().near_load} of it"),
-        ("theory", f"pitch is {virtual_test.PITCH} particle radii"),
-        ("theory", f"within ±{virtual_test.SPREAD:.0%} of the start".replace("%", " %")),
-        ("theory", f"the paper's {virtual_test.CAMERA_MM_PER_PX} mm per pixel"),
+        ("theory", f"pitch is {request.PITCH} particle radii"),
+        ("theory", f"within ±{truth.SPREAD:.0%} of the start".replace("%", " %")),
+        ("theory", f"the paper's {request.CAMERA_MM_PER_PX} mm per pixel"),
         ("theory", "less than a tenth of their δ_max" if observation.PARTED == 0.1 else "changed"),
     ],
 )

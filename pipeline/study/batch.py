@@ -18,8 +18,9 @@ from pipeline.store.atomic import write_atomically
 from pipeline.store.creep import FILE, encode_creep
 from pipeline.store.new import first_experiment
 from pipeline.store.results import prepare_output
+from pipeline.study.truth import made_already
 from pipeline.study.typical_creep import creep_record
-from pipeline.study.virtual_test import made_already, virtual_test
+from pipeline.study.virtual_test import virtual_test
 
 KINDS = tuple(product((1.5, 1.9, 2.4), (None, 0.1)))  # pitch in radii; Poisson's ratio if not the lattice's
 CENTRAL = frozenset({"creep", "rate_law_per_decade"})  # effects for which there is no law of bonds that slide

@@ -21,7 +21,9 @@ from pipeline.study.assembly import CREEPING, build_model
 from pipeline.study.engines import engine as engine_of
 from pipeline.study.filming import Clock
 from pipeline.study.identify import identify
-from pipeline.study.virtual_test import Request, draw_truth, prepare, recording_of, with_noise
+from pipeline.study.request import Request
+from pipeline.study.truth import draw_truth
+from pipeline.study.virtual_test import prepare, recording_of, with_noise
 from pipeline.twin.virtual_test import exact_record, noisy_record
 
 MASTIC = Burgers(0.1 / GPA, 0.04 / GPA, 1500 * GPA, 15.0)

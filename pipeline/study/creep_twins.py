@@ -15,8 +15,9 @@ from pipeline.store.creep import CreepRecord, encode_creep
 from pipeline.store.results import read_result
 from pipeline.study.creep_trials import MASTIC, READINGS
 from pipeline.study.identify import identify
-from pipeline.study.trials import Trial, compare
-from pipeline.study.virtual_test import made_already, virtual_test
+from pipeline.study.trials import Trial, compare, worst
+from pipeline.study.truth import made_already
+from pipeline.study.virtual_test import virtual_test
 
 NOT_FITTED = ("", "", "", "")  # cells
 
@@ -102,7 +103,7 @@ def _fit(trial: Trial | None) -> Sequence[str]:
     """The four cells of one fit."""
     if trial is None:
         return NOT_FITTED
-    return [*_told(_off(trial)), ", ".join("yes" if yes else "no" for yes in (trial.inside_f, trial.inside_delta))]
+    return [*_told(_ratios(trial)), ", ".join("yes" if yes else "no" for yes in (trial.inside_f, trial.inside_delta))]
 
 
 def _foot(trials: Sequence[Trial | None]) -> Sequence[Sequence[str]]:
@@ -110,15 +111,14 @@ def _foot(trials: Sequence[Trial | None]) -> Sequence[Sequence[str]]:
     fitted = [trial for trial in trials if trial is not None]
     if not fitted:
         return 3 * [NOT_FITTED]
-    off = np.array([_off(trial) for trial in fitted])
-    worst = np.take_along_axis(off, np.abs(off).argmax(axis=0)[None], axis=0)[0]
+    ratios = np.array([_ratios(trial) for trial in fitted])
     inside = [f"{sum(getattr(t, k) for t in fitted)} of {len(fitted)}" for k in ("inside_f", "inside_delta")]
-    return [[*_told(np.median(off, axis=0)), ""], [*_told(worst), ""], [*inside, "", ""]]
+    return [[*_told(np.median(ratios, axis=0)), ""], [*_told(worst(ratios)), ""], [*inside, "", ""]]
 
 
-def _off(trial: Trial) -> list[float]:
-    return [trial.f_max - 1, trial.delta_max - 1, trial.energy - 1]
+def _ratios(trial: Trial) -> tuple[float, float, float]:
+    return trial.f_max, trial.delta_max, trial.energy
 
 
-def _told(values: Iterable[float]) -> list[str]:
-    return [f"{value:+.1%}" for value in values]
+def _told(ratios: Iterable[float]) -> list[str]:
+    return [f"{ratio - 1:+.1%}" for ratio in ratios]

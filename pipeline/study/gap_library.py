@@ -41,10 +41,8 @@ FACTORS = (0.7, 0.95, 1.3)  # of the start, for f_max and delta_max
 TURNS = 3  # fits, each with the discrepancy learnt after the one before
 NOISE = (0.1e-6, 2e-6)  # m; of one displacement component: the discrepancy itself does not depend on it
 STEP = 1e-3  # of the grid: central differences
-UNMET = {
-    True: "without-shear.json",
-    False: "with-shear.json",
-}  # in OUT: of specimens that slide or not, what the others say
+# in OUT: what is learnt on the others, for specimens that slide and for those that do not
+UNMET = {True: "without-shear.json", False: "with-shear.json"}
 FEWEST = 4  # specimens of either half
 
 

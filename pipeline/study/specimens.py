@@ -16,11 +16,12 @@ from pipeline.materials.burgers import Burgers
 from pipeline.materials.cohesive import LinearSoftening
 from pipeline.store.bundle import read_bundle
 from pipeline.store.creep import CreepRecord
-from pipeline.store.new import Contents
+from pipeline.store.new import Contents, write_bundle
 from pipeline.store.start import start_parameters
 from pipeline.study.assembly import CREEPING, build_model
 from pipeline.study.creep_trials import READINGS
-from pipeline.study.virtual_test import Request, prepare, write_bundle
+from pipeline.study.request import Request
+from pipeline.study.virtual_test import prepare
 
 CMOD_MAX = {"seb": 0.55 * MM, "dct": 0.6 * MM}
 

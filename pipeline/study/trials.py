@@ -20,15 +20,9 @@ from pipeline.study.assembly import build_model
 from pipeline.study.engines import engine
 from pipeline.study.filming import Clock
 from pipeline.study.identify import identify
-from pipeline.study.virtual_test import (
-    Request,
-    draw_truth,
-    made_already,
-    prepare,
-    recording_of,
-    virtual_test,
-    with_noise,
-)
+from pipeline.study.request import Request
+from pipeline.study.truth import draw_truth, made_already
+from pipeline.study.virtual_test import prepare, recording_of, virtual_test, with_noise
 from pipeline.twin.virtual_test import exact_record, noisy_record
 
 
@@ -173,7 +167,7 @@ def trial_table(trials: Sequence[Trial]) -> str:
             f"{t.peak_mismatch:+.1%} | {t.seconds:.0f} | {_off(t.paper[0])}, {_off(t.paper[1])} |"
         )
     ratios = np.array([(t.f_max, t.delta_max, t.energy, *t.paper) for t in trials])
-    for name, of in (("median", np.median), ("worst", _worst)):
+    for name, of in (("median", np.median), ("worst", worst)):
         *ours, paper_f, paper_delta = (_off(ratio) for ratio in of(ratios, axis=0))
         rows.append(f"| **{name}** | {' | '.join(ours)} | | | | {paper_f}, {paper_delta} |")
     if len(trials) > 1:
@@ -183,7 +177,7 @@ def trial_table(trials: Sequence[Trial]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _worst(ratios: np.ndarray, axis: int) -> np.ndarray:
+def worst(ratios: np.ndarray, axis: int = 0) -> np.ndarray:
     """The ratio furthest from one of each column."""
     return np.take_along_axis(ratios, np.argmax(np.abs(ratios - 1), axis, keepdims=True), axis)[0]
 

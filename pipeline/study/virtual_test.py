@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline import __version__
-from pipeline.config import RunSettings
-from pipeline.core.errors import InputError, UnavailableError
+from pipeline.core.errors import InputError
 from pipeline.core.particles import Phase
 from pipeline.core.specimen import Specimen
-from pipeline.core.units import GPA, MM
+from pipeline.core.units import MM
 from pipeline.equilibrium.solve import solve as find_equilibria
 from pipeline.execution.progress import Progress, Silent
-from pipeline.gap.effects import checked, effect
 from pipeline.materials.burgers import Burgers
-from pipeline.materials.mixture import Mixture
 from pipeline.microstructure.gradation import Grading, fuller_section
 from pipeline.store.atomic import write_atomically
 from pipeline.store.bundle import Bundle, read_bundle
@@ -29,115 +23,20 @@ from pipeline.store.creep_sheet import read_creep_sheet
 from pipeline.store.experiment import Experiment
 from pipeline.store.images import read_grey, read_labels
 from pipeline.store.new import START_DELTA_MAX, START_F_MAX, Contents, first_experiment, write_bundle
-from pipeline.store.results import plain
-from pipeline.study.assembly import grey_levels, mixture, read_phases, settings_of
+from pipeline.study.assembly import grey_levels, read_phases, settings_of
 from pipeline.study.creep_analysis import mastic_creep
 from pipeline.study.effects import planned
 from pipeline.study.filming import LATEST, Clock, draw_clock, film_of, write_film
 from pipeline.study.opening_rate import solve_at_rates
-from pipeline.twin.calibration import calibrated_factors
+from pipeline.study.output import TRUTH
+from pipeline.study.request import CAMERA_MM_PER_PX, Request
+from pipeline.study.truth import draw_truth, nominal, truth_text
 from pipeline.twin.problem import Truth, one_phase
 from pipeline.twin.virtual_test import Recording, VirtualTest
 from pipeline.twin.virtual_test import virtual_test as break_network
 
-SPREAD = 0.12  # the truth lies within ± this share of the start, unless it is given
-PITCH = 1.9  # of the network, in particle radii: no lattice of the identifying side has it
 SECTION_MM_PER_PX, SECTION_MARGIN_PX = 0.1, 5  # of a synthetic section
-CAMERA_MM_PER_PX = 0.0439  # Hill et al. 2017, table 1
-FIELD_NOISE_PX, PIXEL_NOISE = 0.01, 2.0  # px, grey values of 0 to 255
-FRAMES = 61  # under load
 CMOD_MAX_MM = {"seb": 0.6, "dct": 0.65}  # beyond the paper's last station
-
-
-@dataclass(frozen=True)
-class Request:
-    """What a virtual test is asked to be; None is left to chance or to the default.
-
-    Parameters
-    ----------
-    geometry : "seb" or "dct"
-    specimen : image of the specimen, photograph or labels
-    mm_per_px : float; scale of `specimen`, its lower edge at the mouth and its middle on the notch line
-    like : bundle whose specimen, material and settings are taken over, with the creep test of its mastic
-    creep : file with the creep compliance of the mastic, which then creeps; the bundle gets it as its creep test
-    f_max, delta_max : the truth, N per bond of the bundle's lattice and m
-    start : (N, m) in the bundle's [start]
-    radius_mm : of the bundle's lattice
-    noise_px, load_noise_n : standard deviations of displacement (of fields, px) and load (N)
-    images : speckle images instead of displacement fields
-    camera_mm_per_px : float; their scale
-    noise_grey : float; standard deviation of one of their pixels, in grey values of 0 to 255
-    frames : int; images or fields from the beginning of the loading to the end
-    effect : (name, value) pairs; what the model leaves out
-    pitch : float; of the network, in particle radii of the bundle's lattice
-    poissons_ratio : float; of what is broken, that of the bundle where not given; below its limit bonds carry shear
-    """
-
-    geometry: str | None = None
-    specimen: Path | None = None
-    mm_per_px: float | None = None
-    like: Path | None = None
-    creep: Path | None = None
-    f_max: float | None = None
-    delta_max: float | None = None
-    start: tuple[float, float] | None = None
-    radius_mm: float | None = None
-    noise_px: float | None = None
-    load_noise_n: float = 5.0
-    images: bool = False
-    camera_mm_per_px: float | None = None
-    noise_grey: float | None = None
-    frames: int | None = None
-    effect: Sequence[tuple[str, float]] | None = None
-    pitch: float = PITCH
-    poissons_ratio: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, value in self.effect or ():
-            checked(name, value)
-        if not (np.isfinite(self.pitch) and self.pitch > 0):
-            raise InputError(f"pitch = {self.pitch:g} particle radii of the network must be positive")
-        if len({name for name, _ in self.effect or ()}) < len(self.effect or ()):
-            raise InputError("an effect is given twice: give each once, with its whole value")
-        if self.images and self.measuring:
-            raise UnavailableError(
-                f"{', '.join(self.measuring)} with --images is not in this version: make fields, without --images"
-            )
-        of_images = {"--camera-mm-per-px": self.camera_mm_per_px, "--noise-grey": self.noise_grey}
-        others = {"--noise-px": self.noise_px} if self.images else of_images
-        given = [name for name, value in others.items() if value is not None]
-        if given:
-            what = "displacement fields, not to speckle images" if self.images else "speckle images: add --images"
-            raise InputError(f"{' and '.join(given)} belongs to {what}")
-
-    @property
-    def effects(self) -> dict[str, float]:
-        """All effects by name; a creep test that is given is one, in full unless another share is asked for."""
-        return ({"creep": 1.0} if self.creep else {}) | dict(self.effect or ())
-
-    @property
-    def measuring(self) -> dict[str, float]:
-        """The measurement effects among them."""
-        return {n: v for n, v in self.effects.items() if effect(n).kind == "measurement"}
-
-    @property
-    def displacement_noise(self) -> float:
-        """px, of fields"""
-        return FIELD_NOISE_PX if self.noise_px is None else self.noise_px
-
-    @property
-    def pixel_noise(self) -> float:
-        """grey values, of images"""
-        return PIXEL_NOISE if self.noise_grey is None else self.noise_grey
-
-    @property
-    def camera_pitch(self) -> float:
-        """mm, of images"""
-        return self.camera_mm_per_px or CAMERA_MM_PER_PX
-
-    @property
-    def frame_count(self) -> int:
-        return self.frames or FRAMES
 
 
 def virtual_test(
@@ -174,7 +73,7 @@ def virtual_test(
         write_film(out, film, finished, test, clock, of_camera, settings.workers, progress)
     else:
         write_bundle(out, finished, Contents(test.curve, test.field))
-    write_atomically(out / "truth.json", _truth_text(test, truth, request, clock, settings, bundle))
+    write_atomically(out / TRUTH, truth_text(test, truth, request, clock, settings, bundle))
     cmod, load = test.curve.peak()
     return f"virtual test of {test.particles} points and {test.bonds} bonds: peak {load:.0f} N at {cmod / MM:.3f} mm"
 
@@ -262,15 +161,6 @@ def _with_frame(experiment: Experiment, frame: dict[str, Any]) -> Experiment:
     return Experiment.model_validate(raw)
 
 
-def draw_truth(request: Request, bundle: Bundle, rng: np.random.Generator) -> Truth:
-    """The truth that is asked for, or one near the start."""
-    assert bundle.start is not None
-    share = rng.uniform(1 - SPREAD, 1 + SPREAD, 2)
-    f_max = request.f_max or bundle.start.f_max_n * share[0]
-    delta_max = request.delta_max or bundle.start.delta_max_m * share[1]
-    return Truth(float(f_max), float(delta_max), bundle.model.radius)
-
-
 def with_noise(experiment: Experiment, request: Request) -> Experiment:
     """The settings with the noise of the measurement, where the user could know it."""
     known = {"load_std_n": request.load_noise_n}
@@ -300,26 +190,20 @@ def run_test(bundle: Bundle, truth: Truth, request: Request, clock: Clock, rng: 
     phase_map, _ = read_phases(bundle)
     recording = recording_of(bundle, request, clock)
     phase_at = one_phase if phase_map is None else phase_map.at
-    nominal = _nominal(bundle, request)
+    material = nominal(bundle, request)
     return break_network(
         bundle.specimen,
         phase_at,
-        nominal,
+        material,
         truth,
         recording,
         request.pitch * bundle.model.radius,
         rng,
         partial(solve_at_rates, solve=find_equilibria),
-        plan=planned(bundle.specimen, nominal, request.effects),
+        plan=planned(bundle.specimen, material, request.effects),
         mastic=_mastic(bundle, request),
         measuring=request.measuring,
     )
-
-
-def _nominal(bundle: Bundle, request: Request) -> Mixture:
-    """What is broken, but for effects."""
-    known = mixture(bundle)
-    return known if request.poissons_ratio is None else replace(known, poissons_ratio=request.poissons_ratio)
 
 
 def _mastic(bundle: Bundle, request: Request) -> Burgers | None:
@@ -329,74 +213,3 @@ def _mastic(bundle: Bundle, request: Request) -> Burgers | None:
     if bundle.creep is None:
         raise InputError("the effect creep needs a creep test: give --creep FILE, or --like a bundle with creep.csv")
     return mastic_creep(bundle).burgers
-
-
-def made_already(bundle: Path) -> bool:
-    """Whether a virtual test lies there, made with the network's factors that are in force.
-
-    Raises
-    ------
-    InputError
-        where it was made with others, for its truth is another one, or does not say with which
-    """
-    path = bundle / "truth.json"
-    if not path.is_file():
-        return False
-    valid = plain(vars(calibrated_factors()))
-    try:
-        factors = json.loads(path.read_text("utf-8"))["factors"]
-    except (ValueError, KeyError, TypeError):
-        factors = "unknown"
-    if factors != valid:
-        raise InputError(
-            f"{bundle} was made with other factors of the network ({factors}) than are in force ({valid}): "
-            "choose another folder for the output, or go on with the version that began it"
-        )
-    return True
-
-
-def _truth_text(
-    test: VirtualTest, truth: Truth, request: Request, clock: Clock, settings: RunSettings, bundle: Bundle
-) -> bytes:
-    """truth.json: what was put in, and how the network stands for it."""
-    known = {
-        "version": __version__,
-        "f_max_n": truth.f_max,
-        "delta_max_m": truth.delta_max,
-        "radius_mm": truth.radius / MM,
-        "bond_fracture_energy_j_per_m2": truth.f_max * truth.delta_max / (2 * truth.radius * bundle.specimen.thickness),
-        "seed": settings.seed,
-        "network": {
-            "pitch_mm": test.pitch / MM,
-            "points": test.particles,
-            "bonds": test.bonds,
-            "poissons_ratio": _nominal(bundle, request).poissons_ratio,
-        },
-        "factors": vars(test.factors),
-        "noise": _noise(request),
-        "effects": request.effects,
-        "creep": _constants(test.mastic),
-        "sync_offset_s": clock.offset,
-        "factors_check": vars(test.check),
-        "energy_error": test.solution.energy.error,
-    }
-    return (json.dumps(plain(known), indent=2, sort_keys=True) + "\n").encode()
-
-
-def _constants(mastic: Burgers | None) -> dict[str, float] | None:
-    """How the mastic crept, by the names of the command `creep`."""
-    if mastic is None:
-        return None
-    in_gpa = {"d1_per_gpa": mastic.d1 * GPA, "d2_per_gpa": mastic.d2 * GPA, "eta1_gpa_s": mastic.eta1 / GPA}
-    return in_gpa | {"tau2_s": mastic.tau2}
-
-
-def _noise(request: Request) -> dict[str, float]:
-    """The noise that was put in."""
-    if request.images:
-        return {"grey": request.pixel_noise, "mm_per_px": request.camera_pitch, "load_n": request.load_noise_n}
-    return {
-        "displacement_px": request.displacement_noise,
-        "mm_per_px": CAMERA_MM_PER_PX,
-        "load_n": request.load_noise_n,
-    }

@@ -12,6 +12,7 @@ from pipeline.core.curve import LoadCurve
 from pipeline.core.errors import InputError
 from pipeline.core.field import DisplacementField
 from pipeline.core.observation import observe
+from pipeline.core.particles import Phase
 from pipeline.core.problem import Problem, Solution
 from pipeline.core.specimen import Specimen
 from pipeline.core.units import MM
@@ -21,7 +22,7 @@ from pipeline.materials.mixture import Mixture
 from pipeline.twin.calibration import CutCheck, calibrated_factors, check_factors
 from pipeline.twin.effects import Record, put_down, refuse_unknown, spoiled, with_effects, with_voids
 from pipeline.twin.network import irregular_network
-from pipeline.twin.problem import Factors, PhaseAt, Truth, one_phase, twin_problem
+from pipeline.twin.problem import Factors, PhaseAt, Truth, twin_problem
 
 PARTED = 0.1  # of delta_max: a bond opened farther no longer joins two crack flanks
 
@@ -172,10 +173,11 @@ def virtual_test(
     """
     plan = Plan(specimen, mixture) if plan is None else plan
     refuse_unknown(plan)
-    factors = calibrated_factors(stones=phase_at is not one_phase) if factors is None else factors
     of_network, of_noise, of_cuts = rng.spawn(3)
     of_effects = of_network.spawn(1)[0]
     network = irregular_network(plan.specimen, pitch, of_network)
+    stones = bool((phase_at(network.position)[0] == Phase.AGGREGATE).any())
+    factors = calibrated_factors(stones) if factors is None else factors
     phase_at = with_voids(phase_at, plan.specimen, plan.void_share, of_effects)
     stations = recording.frame_cmod[recording.frame_cmod > 0]
     problem = twin_problem(

@@ -33,7 +33,7 @@ def test_the_table(name: str, cpp: Follow) -> None:
     assert np.all(apart < tolerance), apart.max(axis=0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     k_n=st.floats(1e3, 1e12),
     f_max=st.floats(1e-3, 1e6),
@@ -49,7 +49,7 @@ def test_any_opening_on_any_path(k_n, f_max, end, shape, unloading, path, cpp: F
     assert np.all(np.abs(found - expected) / scales(law, expected) < SAME * max(1, 1e-3 * end))  # as said at SAME
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     stiffness=st.floats(0.05, 2),
     strength=st.floats(0.1, 3),

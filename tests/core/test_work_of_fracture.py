@@ -7,7 +7,7 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.core.curve import LoadCurve
@@ -31,7 +31,6 @@ def test_a_triangle_cut_at_the_end_load():
     assert found.complete
 
 
-@settings(deadline=None)
 @given(st.floats(500, 8000), st.floats(0.05e-3, 0.4e-3), st.floats(1.5, 10))
 def test_the_area_of_an_exponential_tail(peak, rise, ratio):
     # after the peak P e^(−w/c): area to P_end is c (P − P_end)

@@ -30,7 +30,7 @@ def test_nodes_are_few_distinct_and_cardinal(d, count):
     np.testing.assert_allclose(weights, np.eye(count), atol=1e-12)  # round-off of sums of a few tens
 
 
-@settings(deadline=None, max_examples=30)  # two cores may be busy
+@settings(max_examples=30)
 @given(st.integers(2, 4), st.integers(0, 2**32 - 1))
 def test_polynomials_are_reproduced_with_their_derivatives(d, seed):
     rng, one = np.random.default_rng(seed), grid(d)

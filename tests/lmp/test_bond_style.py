@@ -97,7 +97,7 @@ def test_force_and_history_are_those_of_python(style: str, angle: float) -> None
             assert local(lmp)[3] == pytest.approx(largest if largest > PEAK else 0, abs=1e-11 * PEAK)  # as above
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.floats(-3, 700), min_size=1, max_size=12))
 def test_any_path_agrees_with_python(path: list[float]) -> None:
     openings = np.array(path) * PEAK

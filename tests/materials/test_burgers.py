@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.core.errors import InputError
@@ -17,7 +17,6 @@ burgers = st.builds(Burgers, compliances, compliances, st.floats(1e8, 1e16), st.
 MASTIC = Burgers(d1=1e-10, d2=0.7e-10, eta1=3e12, tau2=80.0)
 
 
-@settings(deadline=None)
 @given(burgers)
 def test_compliance_begins_at_the_spring_and_ends_in_steady_flow(model):
     assert model.creep_compliance(0.0) == pytest.approx(model.d1, rel=1e-15)  # no arithmetic at t = 0
@@ -27,7 +26,6 @@ def test_compliance_begins_at_the_spring_and_ends_in_steady_flow(model):
     assert np.diff(model.creep_compliance(late))[0] == pytest.approx(rise, abs=4e-16 * model.creep_compliance(late[1]))
 
 
-@settings(deadline=None)
 @given(burgers)
 def test_relaxation_is_two_decaying_exponentials_of_positive_weight(model):
     found = model.relaxation()
@@ -39,7 +37,6 @@ def test_relaxation_is_two_decaying_exponentials_of_positive_weight(model):
     assert found.viscosity == pytest.approx(model.eta1, rel=1e-12)  # as above
 
 
-@settings(deadline=None)
 @given(burgers)
 def test_modulus_and_compliance_are_each_others_inverse(model):
     s = np.logspace(-8, 6, 29) * (1 + 0.3j)
@@ -47,7 +44,6 @@ def test_modulus_and_compliance_are_each_others_inverse(model):
     assert product == pytest.approx(1, abs=1e-12)  # a dozen roundings, no cancellation
 
 
-@settings(deadline=None)
 @given(burgers)
 def test_closed_form_is_the_general_interconversion(model):
     general, own = relaxation_of(model.chain), model.relaxation()
@@ -70,7 +66,6 @@ def test_convolution_of_both_is_time():
     assert found == pytest.approx(time, rel=1e-12)  # 24th order on pieces of 3.5 s: below round-off
 
 
-@settings(deadline=None)
 @given(burgers, st.floats(1e6, 1e12))
 def test_interface_has_the_mean_of_the_compliances(model, modulus):
     mean = model.averaged_with_elastic(modulus)

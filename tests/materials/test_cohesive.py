@@ -158,7 +158,7 @@ def test_breaking_uses_the_same_energy_whatever_the_shape(law: CentralSoftening)
     assert law.softened_share(law.delta_end) == pytest.approx(1, rel=1e-12)  # as before, over a small difference
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(shaped, paths)
 def test_work_of_any_shape_is_stored_plus_dissipated(law: CentralSoftening, path: list[float]) -> None:
     """Gauss quadrature between the corners of the law."""

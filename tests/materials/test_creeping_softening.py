@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -38,7 +38,6 @@ def follow(law: CreepingSoftening, openings: np.ndarray, durations: np.ndarray) 
     return np.array(forces), state
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(-2e-5, 1.5e-4), min_size=1, max_size=20))
 def test_what_does_not_relax_is_the_elastic_law(openings):
     slow = PronySeries(0.0, np.array([1e10]), np.array([1e30]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pipeline.core.errors import InputError
@@ -28,7 +28,6 @@ def terms(draw, least=1):
 flows = st.one_of(st.just(0.0), st.floats(1e-6, 1.0))
 
 
-@settings(deadline=None)
 @given(terms(), flows)
 def test_there_and_back_again(term, infinity):
     series = PronySeries(infinity, *term)
@@ -41,7 +40,6 @@ def test_there_and_back_again(term, infinity):
     assert back.time == pytest.approx(series.time, rel=1e-10)  # likewise
 
 
-@settings(deadline=None)
 @given(terms(), flows)
 def test_product_in_laplace_space_is_one(term, infinity):
     series = PronySeries(infinity, *term)
@@ -49,7 +47,6 @@ def test_product_in_laplace_space_is_one(term, infinity):
     assert product == pytest.approx(1, abs=1e-10)  # sums of twelve terms, zeros to round-off
 
 
-@settings(deadline=None)
 @given(terms(least=0), st.floats(1e-3, 1.0), flows)
 def test_a_chain_relaxes(term, instantaneous, fluidity):
     chain = KelvinChain(instantaneous, fluidity, *term)

@@ -38,7 +38,6 @@ def history(bonds: Arms, moves: list[tuple[float, float]]) -> tuple[np.ndarray, 
     return force, opening
 
 
-@settings(deadline=None)
 @given(materials, steps)
 def test_relaxation_step(material, durations):
     # a jump of 1 µm, then held: f(t) = K(t) δ however time is divided
@@ -49,7 +48,6 @@ def test_relaxation_step(material, durations):
     assert total(bonds, force, opening) == pytest.approx(expected, rel=1e-12, abs=1e-18 * material.instantaneous)
 
 
-@settings(deadline=None)
 @given(materials, steps)
 def test_constant_rate(material, durations):
     # f(t) = v (K_∞ t + Σ K_i τ_i (1 − e^(−t/τ_i)))
@@ -60,7 +58,6 @@ def test_constant_rate(material, durations):
     assert total(bonds, force, opening) == pytest.approx(SHARE * rate * grown, rel=1e-12)  # thirty roundings
 
 
-@settings(deadline=None)
 @given(materials, steps, steps)
 def test_ramp_and_hold(material, rise, hold):
     bonds, rate = arms(material, SHARE), 1e-8
@@ -91,7 +88,7 @@ def _creep_error(model: Burgers, bonds: Arms, count: int) -> float:
     return abs(float(opening[0] / model.creep_compliance(600.0)) - 1)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(materials, st.lists(st.tuples(st.floats(-1e-6, 1e-6), st.floats(0.0, 1e3)), min_size=1, max_size=12))
 def test_work_is_stored_or_crept_away(material, moves):
     # the work of a step is known in closed form from the arms' forces, independent of `crept`

@@ -45,7 +45,7 @@ def test_a_term_a_decade_follows_other_times_to_a_percent():
     assert np.abs(modulus * MASTIC.d1).max() < 0.01  # of E(0); relative to E(1000 s), a twelfth of it, ten times more
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.floats(0.3, 3.0), min_size=31, max_size=31), st.booleans())
 def test_whatever_the_data_the_material_makes_no_energy(scatter, flows):
     chain = fit_creep(TIME, MASTIC.creep_compliance(TIME) * np.array(scatter), spaced_times(1, 1000), flows=flows)

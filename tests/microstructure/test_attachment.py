@@ -30,7 +30,7 @@ def particles_of(specimen, radius=0.6 * MM, angle=0.3, gone=None):
     return Particles(particles.position[stay], radius, particles.phase[stay], particles.stone[stay])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(specimen=st.sampled_from(SPECIMENS), radius=st.floats(0.5, 1.0), angle=st.floats(0, 60))
 def test_grip_forces_act_on_their_line(specimen, radius, angle):
     particles = particles_of(specimen, radius * MM, np.deg2rad(angle))

@@ -38,7 +38,7 @@ def notch_is_between(specimen, a, b):
     return sides & (np.where(b[:, 0] >= a[:, 0], area, -area) > 0)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(specimen=specimens(), radius=st.floats(0.9, 1.6), angle=st.floats(-360, 360))
 def test_bonds_are_all_neighbours_but_those_across_notch_and_holes(specimen, radius, angle):
     packing = hexagonal_packing(specimen, radius * MM, np.deg2rad(angle))
@@ -60,7 +60,7 @@ def test_bonds_are_all_neighbours_but_those_across_notch_and_holes(specimen, rad
     assert length == pytest.approx(2 * radius * MM, rel=1e-12)  # round-off of coordinates of 0.15 m against 1.4 mm
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(specimen=specimens(), radius=st.floats(0.7, 1.2), angle=st.floats(0, 60))
 def test_a_packing_hangs_together_and_its_particles_fill_the_specimen(specimen, radius, angle):
     packing = hexagonal_packing(specimen, radius * MM, np.deg2rad(angle))

@@ -79,7 +79,7 @@ def test_nothing_is_rigid_without_a_triangle():
     assert not rigid_part(*lattice([(0, 0), (1, 0), (2, 0)])).any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(missing=st.sets(st.tuples(st.integers(0, 8), st.integers(0, 7)), max_size=45))
 def test_the_part_found_is_rigid(missing):
     position, pairs = lattice([(i, j) for i in range(9) for j in range(8) if (i, j) not in missing])

@@ -15,7 +15,7 @@ def disks(*spots, shape=(200, 400)):
     return np.any([np.hypot(column - c, row - r) <= radius for c, r, radius in spots], axis=0)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(first=st.integers(15, 60), ratio=st.floats(0.4, 1), share=st.floats(0, 0.6))
 def test_two_disks_with_a_neck_below_the_limit_are_two(first, ratio, share):
     """Circles R, q R meeting in a chord of half length h = share × q R: distance √(R² − h²) + √(q²R² − h²)."""
@@ -29,7 +29,7 @@ def test_two_disks_with_a_neck_below_the_limit_are_two(first, ratio, share):
     assert set(at.tolist()) == {1, 2}
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(first=st.integers(15, 60), ratio=st.floats(0.4, 1), share=st.floats(0.9, 0.99))
 def test_two_disks_with_a_wide_neck_are_one(first, ratio, share):
     second = ratio * first

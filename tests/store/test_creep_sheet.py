@@ -71,7 +71,7 @@ def test_replicates_are_averaged_geometrically():
     assert mean.temperature_c.tolist() == [0, 0, 9]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(1e-3, 1e5), min_size=4, max_size=12, unique=True),
     st.lists(st.floats(1e-3, 1e3), min_size=12, max_size=12),

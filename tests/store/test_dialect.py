@@ -45,7 +45,7 @@ def test_what_is_no_number_with_a_decimal_comma(cell):
     assert parse_number(cell, ",") is None or cell == ""
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_every_number_python_writes_is_read_back(value):
     assert parse_number(repr(value), ".") == value

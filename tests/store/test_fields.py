@@ -34,7 +34,7 @@ def random_field(frames: int, n: int, spread: str) -> DisplacementField:
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 6), st.integers(1, 8), st.sampled_from(["one", "points", "all"]))
 def test_write_then_read_is_the_identity(tmp_path_factory, frames, n, spread):
     path = tmp_path_factory.mktemp("fields") / "fields.h5"

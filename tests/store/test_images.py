@@ -34,7 +34,7 @@ def palette_png(numbers: np.ndarray, palette: np.ndarray) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + body + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.sampled_from([np.uint8, np.uint16]).flatmap(
         lambda kind: arrays(kind, st.tuples(st.integers(1, 12), st.integers(1, 12)))
@@ -138,7 +138,7 @@ def test_a_truncated_file_is_named(tmp_path, read, tenth, suffix):
         read(path)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_a_png_with_a_changed_bit_is_seen(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("bits") / "x.png"

@@ -37,7 +37,7 @@ RAW = {
 PLACES = [(t,) for t in RAW] + [(t, k) for t, v in RAW.items() if isinstance(v, dict) for k in v]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.dictionaries(st.sampled_from(PLACES), JUNK, max_size=4))
 def test_settings_of_any_kind_are_read_or_refused_in_sentences(changes):
     raw = json.loads(json.dumps(RAW))
@@ -57,7 +57,7 @@ NUMBER = st.floats(-100, 100).map(lambda x: f"{x:.3g}") | st.sampled_from(["nan"
 NUMBERS = st.lists(st.lists(NUMBER, min_size=3, max_size=3).map(",".join), min_size=3, max_size=12).map("\n".join)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(["load_cmod.csv", "creep.csv", "frames.csv", "fields.h5", "labels.png", "specimen.tif", FILE]),
     head=st.sampled_from([b"", b"time_s,cmod_mm,load_n\n", b"time_s,compliance_1_per_gpa\n", b"frame,time_s\n"]),
@@ -81,7 +81,7 @@ def problems_of(folder) -> tuple[str, ...] | None:
     return None
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.sampled_from(["", "CMOD,Load,x\n", "Time [s],CMOD [mm],Load [kN]\n"]), TABLE | NUMBERS | st.text(max_size=80))
 def test_records_of_any_content_are_read_or_refused_by_name(tmp_path_factory, head, body):
     path = tmp_path_factory.mktemp("record") / "machine.txt"

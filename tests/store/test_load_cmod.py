@@ -24,7 +24,7 @@ def problems(tmp_path):
     return read
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(*[st.floats(0.01, 100)] * 3), min_size=3, max_size=30), st.booleans())
 def test_write_then_read_is_the_identity(tmp_path_factory, rows, with_line):
     steps = np.array(rows)

@@ -89,7 +89,7 @@ def record_table(seed: int = 0) -> np.ndarray:
     return np.column_stack([cmod / (0.5 * MM) * 60, cmod, load, 1.4 * cmod])
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(dialects())
 def test_the_same_record_in_any_dialect_reads_the_same(tmp_path_factory, dialect):
     table = record_table()
@@ -100,7 +100,7 @@ def test_the_same_record_in_any_dialect_reads_the_same(tmp_path_factory, dialect
     assert np.allclose(read, table, rtol=1e-9, atol=0)  # ten digits are written
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(dialects(), st.integers(0, 5))
 def test_toe_removal_does_not_depend_on_the_dialect(tmp_path_factory, dialect, seed):
     table = record_table(seed) + np.array([0, 0.02 * MM, 30, 0])

@@ -35,7 +35,7 @@ class Verdict(StrEnum):
     CAUSE = "cause"
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.dictionaries(st.text(), JSON, max_size=5))
 def test_what_json_knows_comes_back_the_same(tmp_path_factory, result):
     folder = tmp_path_factory.mktemp("out")

@@ -44,7 +44,7 @@ def path(tmp_path):
     return tmp_path / "x.h5"
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 40), st.booleans(), st.booleans())
 def test_write_then_read_is_the_identity(tmp_path_factory, n, with_flag, long):
     given_values = values(n, b=np.arange(n) * 0.5 if long else 2.5, **({} if with_flag else {"flag": None}))
@@ -117,7 +117,7 @@ def test_a_missing_file_is_named(tmp_path):
         LAYOUT.decode(tmp_path / "x.h5")
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_a_changed_bit_never_changes_an_array(tmp_path_factory, data):
     """Chunks carry check sums and so do the file's structures: arrays are either right or refused."""
@@ -174,7 +174,7 @@ def test_every_layout_names_each_entry_once_with_a_unit_that_fits_its_name(layou
 TEXTS = Layout("texts", (Entry("name", ("n",), "1", "names", "str"), Entry("x", ("n",), "m", "numbers")))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12), max_size=6))
 def test_rows_of_text_are_kept(tmp_path_factory, texts):
     path = tmp_path_factory.mktemp("h5") / "x.h5"

@@ -23,7 +23,7 @@ def clean(rows: int = 600, noise: float = 0.0, seed: int = 0) -> LoadCurve:
     return LoadCurve(cmod / UM, cmod, load, 2 * cmod)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-0.2, 0.2), st.floats(0.1, 10.0))
 def test_an_offset_of_the_gauge_is_taken_off(offset_mm, scale):
     curve = clean()

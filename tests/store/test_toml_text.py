@@ -47,7 +47,7 @@ def experiments(draw) -> Experiment:
     return Experiment.model_validate(raw)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(experiments())
 def test_write_then_read_is_the_identity(experiment):
     sections, problems = parse_experiment(tomllib.loads(toml_text(experiment)))

@@ -6,7 +6,7 @@ import pytest
 from pipeline.execution.progress import Silent
 from pipeline.store.bundle import read_bundle
 from pipeline.study.creep_trials import MASTIC, READINGS, CreepTrial, creep_table, creep_trials, creeping_test
-from pipeline.study.virtual_test import Request
+from pipeline.study.request import Request
 
 
 def test_the_mastic_creeps_by_what_is_said_of_it():

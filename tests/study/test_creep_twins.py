@@ -14,13 +14,16 @@ from pipeline.materials.cohesive import CentralSoftening
 from pipeline.materials.creeping_softening import CreepingSoftening
 from pipeline.store.bundle import Bundle, read_bundle
 from pipeline.store.creep import CreepRecord, encode_creep
+from pipeline.store.results import read_result
 from pipeline.study.assembly import build_model
 from pipeline.study.assembly import test_clock as clock_of  # no test
 from pipeline.study.creep_trials import MASTIC, READINGS
-from pipeline.study.creep_twins import CreepTwin, twin_table
+from pipeline.study.creep_twins import CreepTwin, creep_twins, twin_table
 from pipeline.study.filming import Clock
+from pipeline.study.request import Request
 from pipeline.study.trials import Trial
-from pipeline.study.virtual_test import Request, draw_truth, made_already, run_test, virtual_test
+from pipeline.study.truth import draw_truth, made_already
+from pipeline.study.virtual_test import run_test, virtual_test
 from pipeline.twin.calibration import calibrated_factors
 
 
@@ -93,6 +96,20 @@ def test_a_bundle_that_is_imitated_gives_its_creep_test(creeping: Path, tmp_path
 def test_creep_without_a_creep_test_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="needs a creep test: give --creep FILE"):
         virtual_test(tmp_path / "none", seed=1, radius_mm=2.5, effect=[("creep", 1.0)])
+
+
+@pytest.mark.slow
+def test_a_second_call_goes_on_and_may_fit_without_creep_too(tmp_path: Path) -> None:
+    how = {"radius_mm": 2.5, "engine": "equilibrium", "workers": 1}
+    [first] = creep_twins(tmp_path, ["seb"], [4], elastic=False, **how)
+    assert first.elastic is None
+    made = (tmp_path / "seb-4" / "truth.json").stat().st_mtime_ns
+    [second] = creep_twins(tmp_path, ["seb"], [4], **how)
+    assert (tmp_path / "seb-4" / "truth.json").stat().st_mtime_ns == made
+    assert replace(second.viscoelastic, seconds=first.viscoelastic.seconds) == first.viscoelastic
+    assert second.elastic is not None
+    fits = [read_result(tmp_path / f"seb-4-both-{fit}")["viscoelastic"] for fit in ("viscoelastic", "elastic")]
+    assert fits == [True, False]
 
 
 def test_medians_and_worst_stand_at_the_foot() -> None:

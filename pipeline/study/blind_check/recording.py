@@ -21,8 +21,8 @@ from pipeline.store.new import Contents, write_bundle
 from pipeline.study.blind_check.cases import NOISE, Case, Size
 from pipeline.study.blind_check.specimens import Drawn
 from pipeline.study.photography import camera_frame, view_of
+from pipeline.study.request import CAMERA_MM_PER_PX
 from pipeline.study.typical_creep import creep_record
-from pipeline.study.virtual_test import CAMERA_MM_PER_PX
 
 CLOSE = (0.3, 0.6)  # share of the loading, in which this share of the frames is taken
 STILL = 4  # frames of the unloaded specimen

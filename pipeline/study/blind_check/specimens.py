@@ -18,8 +18,9 @@ from pipeline.core.units import MM
 from pipeline.microstructure.phase_map import PhaseMap, from_labels
 from pipeline.store.experiment import Experiment
 from pipeline.study.blind_check.cases import STRANGERS, Case, Size
+from pipeline.study.request import Request
 from pipeline.study.typical_creep import FLOW, SHARE, TIME
-from pipeline.study.virtual_test import Request, prepare
+from pipeline.study.virtual_test import prepare
 
 SPREAD = 0.12  # the truth lies within ± this share of the start
 MESHES = 6  # tried until one can be followed to the end
